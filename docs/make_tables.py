@@ -101,7 +101,7 @@ def diagram() -> str:
             found = [each.value for each in Trigger if row[each] is target is not drawn.get(each)]
             if found and target is not source:
                 lines.append(f"{source.name} --> {target.name}: {', '.join(found)}")
-    return f"{_drawn(lines)}\n\nWhat a status shows:\n\n{_drawn(shows)}"
+    return f"{_drawn(lines)}\n\nThe condition that a status shows:\n\n{_drawn(shows)}"
 
 
 def _drawn(lines: Sequence[str]) -> str:

@@ -1,8 +1,8 @@
 """The plugin for pytest: a gripper, its server, a hand, and troubles.
 
-The fixtures that need an event loop have that of the test. It is run by pytest-asyncio, in either mode, or by
-anyio's own plugin, which comes with the library. Each has its own way to mark a fixture, and must not see
-that of the other: :mod:`.with_asyncio`, :mod:`.with_anyio`.
+The fixtures that need an event loop use the loop of the test. It is run by pytest-asyncio, in either mode, or
+by anyio's own plugin, which comes with the library. Each plugin has its own way to mark a fixture, and must
+not see the fixtures of the other: :mod:`.with_asyncio`, :mod:`.with_anyio`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Have the fixtures of whatever runs coroutines here."""
+    """Register the fixtures of the plugin that runs coroutines here."""
     for driver in ("anyio", "asyncio"):
         if config.pluginmanager.has_plugin(driver):
             config.pluginmanager.import_plugin(f"{__package__}.with_{driver}")
@@ -32,8 +32,8 @@ def robotiq_speedup() -> float:
 
 @pytest.fixture
 def robotiq_gripper(robotiq_speedup: float) -> SimulatedGripper:
-    """A simulated gripper that was just switched on. To be overridden, for one of another kind."""
-    from robotiq_async.simulator import SimulatedGripper  # noqa: PLC0415  # not for those who do not use it
+    """A simulated gripper that was just switched on. Override it for another kind of gripper."""
+    from robotiq_async.simulator import SimulatedGripper  # noqa: PLC0415  # only if the fixture is used
 
     return SimulatedGripper(speedup=robotiq_speedup)
 
@@ -47,7 +47,7 @@ def robotiq_server(request: pytest.FixtureRequest, robotiq_gripper: SimulatedGri
 
 @pytest.fixture
 def robotiq_address(robotiq_server: SimulatorServer) -> str:
-    """The gripper's address, for an application that makes a hand of its own."""
+    """The gripper's address, for an application that makes its own hand."""
     return robotiq_server.address
 
 
@@ -65,7 +65,7 @@ def robotiq_hand(request: pytest.FixtureRequest, robotiq_server: SimulatorServer
 
 
 def _driver(request: pytest.FixtureRequest) -> str:
-    """The plugin that runs the test, by its name: "anyio" or "asyncio".
+    """The name of the plugin that runs the test: "anyio" or "asyncio".
 
     Raises:
         pytest.UsageError: not one of these two does; the test is no coroutine, or is trio's.

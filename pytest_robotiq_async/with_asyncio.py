@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @pytest_asyncio.fixture
 async def _robotiq_server_with_asyncio(robotiq_gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
-    from .contexts import served  # noqa: PLC0415  # not for those who do not use it
+    from .contexts import served  # noqa: PLC0415  # only if the fixture is used
 
     async with served(robotiq_gripper) as server:
         yield server

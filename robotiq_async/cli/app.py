@@ -48,7 +48,7 @@ A gripper other than the 3-Finger is named at the end: tcp://192.168.1.11?model=
 
 Without an address it is sim://; doctor, verify and measure want one.
 
-What the extras beside cli are for:
+The extras beside cli:
 
     monitor   monitor
     web       web, demo --show
@@ -97,7 +97,7 @@ def _fleet() -> App:
 
 
 def _measure() -> App:
-    app = _app("measure", "Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.")
+    app = _app("measure", "Measure the meaning of the values 0..255 on your gripper. THE FINGERS MOVE.")
     _add(app, speed)
     _add(app, force)
     _add(app, stroke)

@@ -129,7 +129,7 @@ def _argument(option: Option) -> object:
     if option.choices:
         return Annotated[
             Literal[option.choices] | None,
-            Parameter(help=f"{option.help} (default: that of the address, or {option.choices[0]})."),
+            Parameter(help=f"{option.help} (default: the model of the address, or {option.choices[0]})."),
         ]
     if option.is_file:
         return Annotated[str | None, Parameter(metavar="FILE.csv", help=f"{option.help}.")]

@@ -4,7 +4,7 @@
 module          contents
 ==============  ================================================================================
 ``ur``          RobotiqGripper, the class of ``robotiq_gripper.py`` (UR's guides, GELLO)
-``polymetis``   the gRPC server that DROID's robot asks, as a program
+``polymetis``   the gRPC server for DROID's robot, as a program
 ``lerobot``     LeRobot: the part that the robot class of an arm embeds, and a robot around it
 ``patience``    the wait of their calls for a link that is down
 ==============  ================================================================================

@@ -15,7 +15,7 @@ sets: a width in "m" that is linear in counts, a speed of 0.013..0.1 "m/s", a fo
 # The port answers before the gripper is active, because DROID reads the metadata once, 5 s after the
 # launch; a Goto waits for the activation. An active gripper is adopted: a part that is held stays held.
 #
-# DROID's thread of commands ends with the first error of a Goto. So a Goto waits wherever it may.
+# DROID's thread of commands ends with the first error of a Goto. So a Goto waits instead, where it can.
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command; returns its exit code: 0 after a signal, 1 after a failure, 2 for wrong usage."""
     parser = argparse.ArgumentParser(
         prog="python -m robotiq_async.dropins.polymetis",
-        description="The gripper server that DROID asks. The FINGERS of a gripper that is reset MOVE.",
+        description="The gripper server for DROID. The FINGERS of a gripper that is reset MOVE.",
     )
     parser.add_argument("address", help="of the gripper, with its model: rtu:///dev/ttyUSB0?model=2f85")
     parser.add_argument("--yes", action="store_true", help="move without a question")
@@ -207,7 +207,7 @@ def _agrees(address: str, parser: argparse.ArgumentParser) -> bool:
     if not sys.stdin or not sys.stdin.isatty():
         parser.error("this moves the gripper; without a terminal to ask at it needs --yes")
     return input(
-        f"{address}: the FINGERS MOVE if it is reset, and whenever DROID says so. Continue? [y/N] "
+        f"{address}: the FINGERS MOVE if it is reset, and at each command of DROID. Continue? [y/N] "
     ) in ("y", "yes")
 
 

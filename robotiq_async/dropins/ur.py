@@ -234,7 +234,7 @@ class RobotiqGripper:
         """A variable of the URCap's port, from a fresh status; programs read OBJ, PRE, FLT, SPE and FOR.
 
         Raises:
-            ValueError: one that no status carries.
+            ValueError: a variable that no status has.
             OSError: the link stayed down; of OBJ also if the move was lost long ago.
             MoveSupersededError: of OBJ, if another client commands.
         """

@@ -1,4 +1,4 @@
-"""Errors of hands on other hosts, beside those of every hand.
+"""Errors of hands on other hosts, in addition to the errors of every hand.
 
 ::
 

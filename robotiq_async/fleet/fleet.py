@@ -37,7 +37,7 @@ class Member:
     Attributes:
         name: the gripper's name.
         is_there: whether an agent serves it now.
-        agents: number of agents that serve it; more than one is a mistake.
+        agents: number of agents that serve it; more than 1 is a mistake.
         state: of the agent's hand; None before the first summary.
         fault: the fault that the gripper reports; None if unknown.
         is_moving: whether an axis moves.
@@ -133,11 +133,11 @@ class Fleet:
 
     @property
     def members(self) -> Mapping[GripperName, Member]:
-        """All grippers seen since the fleet was entered, also those that have left."""
+        """All grippers seen since the fleet was entered, also grippers that have left."""
         return dict(sorted(self._members.items()))
 
     def changes(self) -> Stream[Member]:
-        """A stream of members: each one whenever it joins, leaves, moves, fails or changes otherwise."""
+        """A stream of members: each member when it joins, leaves, moves, fails or changes otherwise."""
         return self._changes.open(None)
 
     def hand(self, name: GripperName | str, *, control: bool = True) -> RemoteHand:
@@ -289,7 +289,7 @@ class _AgentRun:
 
 
 class Summaries:
-    """Reads summaries, and drops those that were overtaken."""
+    """Reads summaries, and drops summaries that were overtaken."""
 
     def __init__(self) -> None:
         self._runs: dict[GripperName, _AgentRun] = {}  # the last run of the agent, by gripper

@@ -21,9 +21,9 @@ _FAULTY: Final = frozenset({State.FAULT, State.ATR_DONE, State.WF_ATR})
 _STAYS_HELD: Final = "the fingers are held, and nothing resumes when it clears"
 DOES: Final = {
     Severity.PRIORITY: "the action is delayed or ignored: see which request came too early",
-    Severity.MINOR: f"{_STAYS_HELD}; free what blocks, recover() waits for it",
-    Severity.MAJOR: "the fingers stop, a part stays held until the reset; free what blocks, then recover() "
-    "resets and activates: it DROPS the part and MOVES the fingers",
+    Severity.MINOR: f"{_STAYS_HELD}; clear the obstruction, recover() waits for it",
+    Severity.MAJOR: "the fingers stop, a part stays held until the reset; clear the obstruction, then "
+    "recover() resets and activates: it DROPS the part and MOVES the fingers",
 }
 """The motion of the fingers in a fault, and the remedy."""
 UNKNOWN_FAULT: Final = (

@@ -1,4 +1,4 @@
-"""The actions by which a person operates a hand: with a key of the monitor or a button of the page."""
+"""The actions of a person at a hand: each has a key of the monitor and a button of the page."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Operator:
 
         Args:
             hand: started before or after.
-            who: the place of a person who halts for good; empty for a program.
+            who: the person's name or place, for an inhibit; empty for a program.
             speed: of the hand's constructor.
             force: of the hand's constructor.
 
@@ -298,19 +298,19 @@ _IN_ORDER: Final = (
         "reset",
         "reset the gripper",
         _done(lambda hand: hand.reset(), "the gripper is reset"),
-        warning="The gripper lets go: what it holds DROPS.",
+        warning="The gripper lets go: the part DROPS.",
     ),
     Action(
         "release",
         "release in a fault",
         _done(lambda hand: hand.atr(), "released; only a reset helps now"),
-        warning="All fingers OPEN slowly, whatever the fault: what they hold DROPS.",
+        warning="All fingers OPEN slowly, in any fault: the part DROPS.",
     ),
     Action(
         "recover",
-        "do what the fault needs",
+        "recover from the fault",
         _done(lambda hand: hand.recover(), "the gripper is active"),
-        warning="A major fault needs a reset and an activation: what it holds DROPS, the fingers MOVE.",
+        warning="A major fault needs a reset and an activation: the part DROPS, the fingers MOVE.",
     ),
 )
 ACTIONS: Final = MappingProxyType({action.name: action for action in _IN_ORDER})

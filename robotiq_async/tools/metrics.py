@@ -115,7 +115,7 @@ class HandCollector(Collector):
         yield from self._conditions()
 
     def _conditions(self) -> Iterator[Metric]:
-        """The series for alarms. Those of a hand are few and always the same: one of faults a code."""
+        """The series for alarms. A hand has few, and always the same: for faults a series for each code."""
         families = {
             name: GaugeMetricFamily(f"robotiq_{name}", text, labels=["hand"]) for name, text in _NOW.items()
         }
@@ -156,7 +156,8 @@ class _ScrapeServer(ThreadingMixIn, TCPServer):
     """Answers scrapes, each in a thread.
 
     It runs in the process of the hands. So it limits the threads and files that strangers can use up, which
-    the server of prometheus_client does not, and asks no name server in the event loop, as http.server does.
+    the server of prometheus_client does not, and queries no name server in the event loop, as http.server
+    does.
     """
 
     daemon_threads = True

@@ -44,7 +44,7 @@ class Health:
     Attributes:
         name: of the hand, or its address.
         state: of the hand.
-        status_age: seconds since the newest status was read; None if there is none.
+        status_age: seconds since the newest status was read; None before the first.
         fault: the gripper's fault in the newest status.
         holds: the fingers that hold a part by the newest status, as its ``part`` says.
         problem: the reason why the hand takes no motion commands now, in a sentence; empty if it does.
@@ -130,7 +130,7 @@ class Signals:
     """The signals that have come.
 
     Attributes:
-        received: the number of the first signal; 0 if there was none.
+        received: the number of the first signal; 0 if none came.
     """
 
     def __init__(self) -> None:
@@ -213,7 +213,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
 
 
 def _without_stopped(error: NotStartedError | BaseExceptionGroup[BaseException]) -> BaseException | None:
-    """Errors that a stop does not explain; None if there are none. Each task of a group has its own."""
+    """The errors that a stop does not explain, or None. Each task of a group has its own errors."""
     return error.split(NotStartedError)[1] if isinstance(error, BaseExceptionGroup) else None
 
 
@@ -222,8 +222,8 @@ async def watched_by_systemd(*hands: Hand) -> AsyncIterator[None]:
     """Notify systemd of readiness, life and health of the service; without systemd, do nothing.
 
     For a unit with ``Type=notify``. With ``WatchdogSec=`` the event loop notifies it twice in that time. When
-    the loop hangs, or a hand has ended by itself, it gets no more notifications, and restarts the service. A
-    gripper that is off or in fault is no reason to: ``systemctl status`` shows it.
+    the loop hangs, or a hand has ended by itself, it gets no more notifications, and restarts the service. It
+    does not restart it for a gripper that is off or in fault: ``systemctl status`` shows that.
     """
     tell = _Systemd()
     if not tell.is_there:

@@ -67,7 +67,7 @@ def axis_name(axis: Finger, model: Model) -> str:
 
 
 def holding_words(status: RobotiqStatus) -> str:
-    """The part that is held: ``holding 43 mm``, of a 3-Finger ``holding``; empty for none."""
+    """The part that is held: ``holding 43 mm``, of a 3-Finger ``holding``; empty without a part."""
     part = status.part
     if part is None:
         return ""

@@ -81,7 +81,7 @@ gDT: Final = tuple(
     Field(1, 2 * n, 2, f"{name}: 0 moving, 1 contact opening, 2 contact closing, 3 at position")
     for n, name in enumerate("ABCS")
 )
-gOBJ: Final = Field(0, 6, 2, "as gDT, of a 2F or a Hand-E: in place of gSTA and gDT")
+gOBJ: Final = Field(0, 6, 2, "as gDT, of a 2F or a Hand-E: instead of gSTA and gDT")
 gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
 kFLT: Final = Field(
     2, 4, 4, "fault of the Universal Controller before a 2F or a Hand-E; 0 where there is none"

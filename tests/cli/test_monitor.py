@@ -377,7 +377,7 @@ async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator)
     [
         (MoveSupersededError("a release took over"), "a release took over"),
         (MoveSupersededError("it moved", advice="call move() again"), "it moved"),
-        (GripperFaultError(Fault.SCISSOR_BLOCKED, "major fault"), "major fault; v does what it needs"),
+        (GripperFaultError(Fault.SCISSOR_BLOCKED, "major fault"), "major fault; v recovers it"),
         (refusal(Trigger.ASK_COMMAND, State.RESET), "the gripper is not activated; a activates it"),
         (
             refusal(Trigger.ASK_RELEASE, State.RUNNING_IDLE),

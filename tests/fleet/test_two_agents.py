@@ -159,7 +159,7 @@ async def test_the_halt_of_all_stops_a_second_one_whose_link_comes_up_late(here:
 
 @inside(lab)
 async def test_a_second_agent_of_a_host_is_refused_for_any_gripper(here: Lab) -> None:
-    for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a host of its own")):
+    for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a different host")):
         agent = Agent("lab", "cell", {name: RobotiqHand("sim://")}, here.network.bus(f"second {name}"))
         with pytest.raises(AgentError, match=words):
             await agent.run()

@@ -330,7 +330,7 @@ async def test_a_deactivation_without_a_link_halts_when_it_is_back(
     levels = {record.getMessage(): record.levelno for record in caplog.records}
     (failed,) = (level for text, level in levels.items() if "no halt, the fingers MAY STILL MOVE" in text)
     assert failed == logging.ERROR
-    assert "the link is back, and what still moved has been stopped" in caplog.text
+    assert "the link is back, and axes that still moved were stopped" in caplog.text
 
 
 async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(

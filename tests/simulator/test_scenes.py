@@ -121,7 +121,7 @@ def test_a_control_that_cannot_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"joint must be one of \['z'\], got 'can'"):
         physics.joint("can")
     for call in (lambda: physics_of_table().control("mount", 1), lambda: physics_of_table().joint("mount")):
-        with pytest.raises(RuntimeError, match="only a scene of a file"):
+        with pytest.raises(RuntimeError, match="only a scene from a file"):
             call()
 
 

@@ -104,8 +104,8 @@ async def test_back_to_back_each_is_answered(line: RtuOverTcpSimulatorServer) ->
     await writer.wait_closed()
 
 
-def test_each_needs_a_unit_id_of_its_own() -> None:
-    with pytest.raises(ValueError, match="a unit id of its own, got 9 twice"):
+def test_each_needs_a_different_unit_id() -> None:
+    with pytest.raises(ValueError, match="a different unit id, got 9 twice"):
         RtuOverTcpSimulatorServer(others={9: SimulatedGripper()})
     with pytest.raises(ValueError, match=r"a unit id of others must be in 1\.\.247, got 0"):
         SerialSimulatorServer("/dev/ttyFAR", others={0: SimulatedGripper()})

@@ -380,7 +380,7 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
             async with asyncio.timeout(patience(20)):
                 failure = await recorder.failure()
             assert "No space left" in str(failure)
-            assert "the recording has ended, the hand runs on: " in caplog.text, "at once, and not in an hour"
+            assert "the recording has ended, the hand runs: " in caplog.text, "at once, and not in an hour"
             assert hand.state is State.RUNNING_IDLE
             assert len(gripper.writes) == writes
             await hand.move(50)

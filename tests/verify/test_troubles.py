@@ -233,4 +233,4 @@ async def test_a_write_that_is_forgotten_is_told_with_the_distance_at_which_it_a
     async with served("write-spacing 0.008") as server:
         report = await verified(server, first=2, last=2)
     found = report.checks["write.spacing"].found
-    assert found == "a write 5 ms after another is acknowledged and forgotten, and one 11 ms after it acts"
+    assert found == "a write 5 ms after another is acknowledged and forgotten, and a write 11 ms later acts"

@@ -333,7 +333,7 @@ def test_what_a_browser_sends_at_length_ends_no_page() -> None:
 
 async def test_operators_are_those_of_the_hands() -> None:
     one, other = FakeHand(), FakeHand()
-    with pytest.raises(ValueError, match="operators must be those of the hands"):
+    with pytest.raises(ValueError, match="operators must belong to the hands"):
         PageServer([one], PageSettings(control=True), operators=[Operator(other)])
     with pytest.raises(ValueError, match="control needs operators"):
         PageServer([one], PageSettings(control=True))

@@ -55,7 +55,7 @@ async def agent(
 
     Args:
         file: The site's name, and the grippers.
-        check: Check the file, print what would be served, and end.
+        check: Check the file, print the hands that it serves, and end.
     """
     settings = _settings(file)
     if not check:
@@ -105,7 +105,7 @@ async def _serve(settings: AgentSettings) -> None:
         finally:
             await bus.close()
     except asyncio.CancelledError:
-        log.info("the agent was asked to end")  # the normal end of this command
+        log.info("the agent ends")  # the normal end of this command
 
 
 async def _open(configuration: dict[str, object], where: str) -> ZenohBus:
@@ -125,5 +125,5 @@ def _announce(served: Agent, settings: AgentSettings) -> None:
     try:
         for each in served.hands.values():
             print(each.name, flush=True)
-    except BrokenPipeError:  # the reader has gone; the agent serves all the same
+    except BrokenPipeError:  # the reader has gone; the agent still serves
         forget(sys.stdout)

@@ -24,7 +24,7 @@ async def doctor(
     *,
     device_id: Unit | None = None,
 ) -> None:
-    """Find out what is wrong with a connection. Nothing moves and nothing is written.
+    """Find the fault of a connection. Nothing moves and nothing is written.
 
     Name, port, Modbus or URCap, unit id, register addresses, round trip and rate, activation,
     fault, other clients: one line each, with advice. For a gripper on another host:

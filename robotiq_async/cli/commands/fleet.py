@@ -105,9 +105,9 @@ async def halt(site: Site = None, /) -> None:
 
 
 async def permit(*addresses: str, yes: Yes = False) -> None:
-    """Permit motion again after a halt, of the grippers that are named. Look at them first.
+    """Permit motion of the named grippers again after a halt. Look at them first.
 
-    Nothing moves by it, but a program may move the fingers at once. It shows the halt of one
+    The command moves nothing, but a program may move the fingers at once. It shows the halt of one
     gripper after another and asks, and without a terminal needs --yes. A halt that comes after
     the question stays. Exits with 1 unless motion of all of them is permitted.
 
@@ -205,7 +205,7 @@ def keys(
     operate: Operators = (),
     days: Annotated[int | None, Parameter(metavar="N", show_default=False)] = None,
 ) -> None:
-    """Make keys for agents and clients, and set who may do what.
+    """Make keys for agents and clients, and set the role of each client.
 
     The first time it makes a certificate authority in FOLDER. Every agent and every client
     (that reads, that also halts, that operates) gets a folder in it, for you to copy to its
@@ -291,6 +291,6 @@ def _make(folder: Path, subjects: list[Subject], days: int) -> None:
         print(f"{path}: for {use}")
     if any(subject.role is not Role.AGENT for subject in subjects):
         own, *copies = access_lists(folder)
-        print(f"{own}: who may do what")
+        print(f"{own}: the role of each client")
         for copy in copies:
             print(f"{copy}: a copy; agents use it from their next start on")

@@ -58,7 +58,7 @@ def force(
         robotiq-async measure force 192.168.1.11 --runs 1
 
     Args:
-        surface: What the fingers touch: the scale itself, or foam around it.
+        surface: Surface that the fingers touch: the scale itself, or foam around it.
         output: The readings (default: force_SURFACE_grams.csv); currents and plots have its name.
         scale: A table of readings, instead of typing them.
         step: Distance between force values.

@@ -48,7 +48,7 @@ async def monitor(
         SPACE    halt
         + -      speed
         ] [      force
-        p        any position of any axes: asks for them
+        p        any position of any axes: a prompt takes them
         a r l v  activate, reset, release, recover: ask first
         q        quit
 

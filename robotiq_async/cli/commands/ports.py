@@ -40,7 +40,7 @@ def ports() -> None:
 
 
 def with_ports(error: RobotiqError) -> str:
-    """The message of an error; if a serial port is missing, those that there are belong to it."""
+    """The message of an error; if a serial port is missing, with the present ports."""
     message = str(error)
     if not message.endswith(MISSING):  # it is about something else, or names the adapters
         return message

@@ -133,7 +133,7 @@ def export(
     Args:
         file: The recording.
         target: The table, named .csv (default: named as the recording).
-        of: What has a row.
+        of: The records that become rows.
         convention: COUNTS, or a learning stack, such as DROID or LEROBOT; needed for statuses.
     """
     named = _convention(convention, of)
@@ -268,7 +268,7 @@ async def record(
 
     It only watches: nothing moves and nothing is written to the gripper. The file is
     MCAP, for viewers (Foxglove, PlotJuggler), and for replay, plot and export. Tools of
-    ROS 2 open only one made with --ros2. A file named .csv is a table with a row for each
+    ROS 2 open it only if it was made with --ros2. A file named .csv is a table with a row for each
     poll, for spreadsheets and pandas; it needs no extra but cli. Commands are recorded only
     in the program that sends them, so this file has none: to record yours, use
     robotiq_async.tools.recording.recorder.Recorder in your program. A killed recording

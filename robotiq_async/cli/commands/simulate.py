@@ -96,7 +96,7 @@ async def simulate(
         host: Interface to listen on. Modbus has no password: all who reach the port can command.
         model: The gripper: a 3-Finger (the default), 2F-85, 2F-140 or Hand-E; again for the next --device-id.
         speedup: Factor by which simulated time is faster than the clock.
-        like_hardware: Have the habits of real grippers (the default), or with --plain none.
+        like_hardware: Have the habits of real grippers (the default), or with --plain no habits.
         exact: Stop exactly at the requested position, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
         fixed: The object stays there in an activation, which then fails with fault 0x0D.

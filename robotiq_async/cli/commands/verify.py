@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 HARMLESS = 2
 FIRST_RUN_NOTE = (
-    "None of this has run on real hardware: yours may be the first. It is no safety function: have an "
+    "None of this has run on real hardware: your gripper may be the first. It is no safety function: have an "
     "emergency stop in reach that cuts the gripper's power. While a stage runs ANY KEY stops the fingers."
 )
 
@@ -48,8 +48,8 @@ async def verify(
 
     Ten stages: this computer; reading only; writing with rGTO = 0; activation; one
     axis at a time, slowly; stopping; full strokes; something soft; loss of client,
-    cable, emergency stop and power; soak. Each announces what moves, how far, how fast
-    and what must be clear. Enter begins it; any other key ends with the report so far.
+    cable, emergency stop and power; soak. Each announces the moving axes, their way and speed,
+    and the space to keep clear. Enter begins it; any other key ends with the report so far.
 
     Stages 0 to 2 move nothing, take four minutes, and make a report that is worth sending.
     While a stage runs any key and Ctrl-C write rGTO = 0 first. No stage beyond 2 runs
@@ -72,7 +72,7 @@ async def verify(
         report: Folder for the report; it must not contain one yet.
         yes_to: Do not ask for the stages up to this one, at most 2.
         label: Title of the report; it appears there as you write it.
-        model: The gripper (default: that of the address, or 3f).
+        model: The gripper (default: the model of the address, or 3f).
     """
     if is_remote(address):
         raise UsageError("verify does not use an agent: run it on the host that is connected to the gripper")

@@ -55,7 +55,7 @@ def make_authority(folder: Path, *, days: int = AUTHORITY_DAYS) -> Path:
 def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), days: int = DAYS) -> Path:
     """Make a key and a certificate for an agent or a client, and add a client to the access lists.
 
-    ``hosts`` are names and IP addresses by which clients connect to the agent; loopback is added. Returns the
+    ``hosts`` are names and IP addresses that clients use for the agent; loopback is added. Returns the
     folder for that machine.
 
     Raises:

@@ -49,7 +49,7 @@ def status_line(fields: Properties) -> str:
 
 
 def _opening(name: str, fields: Properties) -> str:
-    # Recordings of earlier versions have none.
+    # Recordings of earlier versions have no opening.
     mm = fields[name].get("opening_mm") if _title(name, fields) == JAW_NAME else None
     return "" if mm is None else f" ({float(mm):.1f} mm)"
 
@@ -138,7 +138,7 @@ async def _print(history: _History, formatter: Formatter, interval: float) -> No
     with forwarded_warnings(history.add_warning, of=history.hand.name):
         ended = False
         while not ended:
-            ended = history.hand.state is State.SHUTDOWN  # and once more for the last events
+            ended = history.hand.state is State.SHUTDOWN  # then a last turn, for the last events
             if lines := formatter(list(history.new())):
                 data = "".join(f"{line}\n" for line in lines).encode()
                 await _write(data)

@@ -90,4 +90,4 @@ class TargetQuestion:
         return False
 
 
-Asking = Question | TargetQuestion  # takes the keys, except those that halt
+Asking = Question | TargetQuestion  # takes the keys, except the keys that halt

@@ -169,7 +169,7 @@ class Monitor(App[None]):
     # -- keys -----------------------------------------------------------------------------------------
 
     async def on_event(self, event: events.Event) -> None:
-        """Pass keys to the open question, except those that halt."""
+        """Pass keys to the open question, except the keys that halt."""
         if isinstance(event, events.Key) and self.asking is not None and event.key not in HALTING:
             self.ask(None if self.asking.press(event.key) else self.asking)
         else:
@@ -192,7 +192,7 @@ class Monitor(App[None]):
             begin()
 
     def action_permit(self) -> None:
-        """Permit motion after a yes: of the halt that the question shows, and of none that comes later."""
+        """Permit motion after a yes. It lifts the halt that the question shows, and no later halt."""
         action, seen = ACTIONS["permit"], self._hand.inhibited
         if seen is None:
             self.write_log("permit: motion is not inhibited", "bold")

@@ -32,7 +32,7 @@ o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
 a activate  r reset  l release  v recover  p position  m permit       q quit"""
 
 HINTS: Final = {
-    State.FAULT: "v does what it needs",
+    State.FAULT: "v recovers it",
     State.ATR_DONE: "r resets it",
     State.RESET: "a activates it",
 }

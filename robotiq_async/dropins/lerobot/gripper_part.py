@@ -78,7 +78,8 @@ class GripperPart:
     def observations(self) -> tuple[str, ...]:
         """The keys of an observation, known before :meth:`connect`: over a URCap without a current.
 
-        Some URCaps tell it, but which only shows once it is asked, and features come before.
+        Some URCaps report it, but only the first answer shows whether this one does, and features are needed
+        before.
         """
         current = ("gripper.current",) if self._tells_current else ()
         return ("gripper.pos", *current, "gripper.contact")
@@ -182,7 +183,7 @@ class GripperPart:
             clamp: whether a number beyond its range counts as the end, for policies, which overshoot.
 
         Returns:
-            What was sent, by key: ``gripper.pos``, and ``gripper.force`` if it was given.
+            The values that were sent, by key: ``gripper.pos``, and ``gripper.force`` if it was given.
 
         Raises:
             TypeError, ValueError: not a number, or outside its range. Nothing is sent.

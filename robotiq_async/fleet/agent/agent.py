@@ -32,7 +32,7 @@ class Agent:
     """Owns the hands of one host and serves them, each in a separate task.
 
     Attributes:
-        hands: the served hands, by the name of the gripper.
+        hands: the served hands, each under the name of its gripper.
         epoch: random; identifies this run of the agent.
     """
 
@@ -86,8 +86,8 @@ class Agent:
     async def run(self, ready: Callable[[], object] = lambda: None) -> None:
         """Serve until cancelled; then stop the fingers and close the links.
 
-        A gripper that cannot be reached is tried again every second. What moves when the agent connects is
-        held, because its client is gone.
+        A gripper that cannot be reached is tried again every second. Axes that move when the agent connects
+        are held, because their client is gone.
 
         Args:
             ready: called when the agent begins to answer requests.
@@ -101,8 +101,8 @@ class Agent:
         try:
             await self._refuse_beside_others()
             undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in hands]
-            # Of several agents that start at the same moment the one with the lowest epoch remains. One that
-            # is there at the second look started before this one, and its token came late.
+            # Of several agents that start at the same moment the agent with the lowest epoch remains. An
+            # agent that is there at the second look started before this one, and its token came late.
             if await self._refuse_beside_others(before=self.epoch):
                 await self._refuse_beside_others()
             for each in hands:
@@ -114,7 +114,7 @@ class Agent:
                 "lease": self._sort,
                 "cmd/*": self._sort,
                 "info/*": questions.sort,
-                # Clients of version 1 ask there: they are told that this is another one.
+                # Clients of version 1 ask there: the answer says that this is another version.
                 "info": questions.sort,
             }
             undo += [
@@ -145,7 +145,7 @@ class Agent:
         if name.gripper in self.hands:
             return f"another agent serves {name} already"
         return (
-            f"another agent with this host name serves {name}: give each agent a host of its own in its file"
+            f"another agent with this host name serves {name}: give each agent a different host in its file"
         )
 
     async def _others(self) -> list[tuple[int, GripperName]]:

@@ -41,7 +41,7 @@ class Inhibits:
         return inhibit
 
     async def permit(self, call: AgentCall) -> None:
-        """Permit motion after the halt that a client names; one that names none is of none that there is."""
+        """Permit motion after the halt that a client names. A permit that names no halt lifts none."""
         seen = _read(call.arguments.get("inhibited"), _NONE)
         await self._hand.permit(who=_signed(call), seen=seen)
 
@@ -58,6 +58,6 @@ def _read(fields: object, otherwise: Inhibit) -> Inhibit:
 
 
 def _signed(call: AgentCall) -> str:
-    """The person who asks, as the client says, and the label of the client."""
+    """The person who made the request, in the client's words, and the label of the client."""
     who = label_of(call.arguments.get("who", ""))
     return f"{who}, {call.label}"[:LABEL_MAX] if who else call.label

@@ -100,7 +100,7 @@ class Jobs:
         self._log = log
         self._ended = ended
         self._kept: dict[Key, Job] = {}
-        self._open: dict[Key, Job] = {}  # those of them without an answer
+        self._open: dict[Key, Job] = {}  # of these, the jobs without an answer
         self._forgotten = -math.inf
         """The newest stamp that a request, which is no longer kept, had seen."""
         self._followed: dict[Finger, Job] = {}  # by axis, the newest that sends it to a position
@@ -142,7 +142,7 @@ class Jobs:
         return Finger(sum(axis for axis, job in jobs if job.call.number == number and job.has_failed))
 
     def cancel_all(self, lease: int, reason: str, *, leaves: bool = False) -> None:
-        """A lease has ended. ``leaves`` says that its moves go on."""
+        """A lease has ended. With ``leaves`` its moves continue."""
         for job in self._open.values():
             is_of_it = job.call.lease == lease and job.name != "release"
             if is_of_it and not (leaves and job.name == "move"):
@@ -189,7 +189,7 @@ class Jobs:
         job.reply(answer.pack(), self._publisher.status_message())
 
     def _forget(self) -> None:
-        # The oldest that is answered: a repetition of one that runs must not be carried out twice.
+        # The oldest answered job: a repetition of a running job must not be carried out twice.
         for key, job in self._kept.items():
             if job.answer is not None:
                 self._forgotten = max(self._forgotten, job.call.seen)

@@ -1,15 +1,15 @@
 """KeptSettings: the agent is the keeper of speeds and forces, also over its own restart.
 
-They have no echo in the status, so only those who write them know them. The agent keeps a value once the
-gripper has acknowledged it: one of unknown outcome never takes effect later.
+They have no echo in the status, so only their writers know them. The agent keeps a value once the gripper has
+acknowledged it: a value of unknown outcome never takes effect later.
 """
 
 # Theory of operation
 #
 # A speed or a force changes in two ways alone: a client sets it, or a command moves its axis. The first
-# motion of an axis under a new holder gets the holder's own values, and where it has none those of the hand's
-# options. So the force of the client before it is not used for a part that this client moves, and a grip is
-# not changed by a change of holder, by a hold or by a halt.
+# motion of an axis under a new holder gets the values that this holder has set, else the values of the hand's
+# options. So the force of an earlier client is not used for a part that this client moves, and a grip is not
+# changed by a change of holder, by a hold or by a halt.
 #
 # While one client stays the last holder, nothing is restored, also after a loss of its lease: the gripper has
 # its values. A hand that is started again has no memory of them, so it is given the values of the gripper.
@@ -61,7 +61,7 @@ class KeptSettings:
         return client in self._of
 
     def receive(self, settings: Mapping[Setting, int]) -> None:
-        """The holder sends those that were carried out, because they were not kept."""
+        """Take the holder's settings that were carried out: the agent has not kept them."""
         self._of[self._holder] = dict(settings)
         self._changed()
 

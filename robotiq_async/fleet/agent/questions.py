@@ -10,7 +10,7 @@ from ..limited_log import LimitedLog
 from ..network.bus import MessageKind
 
 EACH: Final = 100.0  # questions a second of one client; fetching missed events takes 50
-_MOST_CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent one is forgotten
+_MOST_CLIENTS: Final = 1000  # Clients with their own budget. The least recent is forgotten
 
 
 class AgentQuestions:

@@ -50,7 +50,7 @@ class Records:
         return record if record and self._boot and record.get("boot") == self._boot else None
 
     def read_inhibit(self, name: GripperName) -> object:
-        """The inhibit in the record of a gripper, whenever it was written; None for none.
+        """The inhibit in the record of a gripper, of any age; None if it has none.
 
         Of a record that cannot be read, something that is no inhibit.
         """
@@ -58,7 +58,7 @@ class Records:
         return _NOT_READABLE if record is None else record.get("inhibited")
 
     def _stored(self, name: GripperName) -> Fields | None:
-        # Empty if there is none, None if it cannot be read.
+        # Empty without a record, None if it cannot be read.
         try:
             record = json.loads(self._path(name).read_bytes()) if self._folder else {}
         except (FileNotFoundError, NotADirectoryError):

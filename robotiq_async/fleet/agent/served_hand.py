@@ -12,12 +12,12 @@
 # Work that takes time is a task in Jobs, which gives each repetition of its message the same answer.
 #
 # The lease ends in end_lease() alone: released, expired, taken, halted by another client, or closed. That
-# cancels the holder's requests, drops those that were not sent, and holds the axes that it has commanded. If
-# the link is down then, they wait until the gripper is reached, unless the next holder moves them first
-# (Fingers).
+# cancels the holder's requests, drops the requests that were not sent, and holds the axes that it has
+# commanded. If the link is down then, the holds wait until the gripper is reached, unless the next holder
+# moves these axes first (Fingers).
 #
 # run() starts the hand again every RETRY_S while the gripper cannot be reached. Fingers that move at a start
-# are held: no client is there for them. At its end the hand is stopped, whichever client holds the lease.
+# are held: no client is there for them. At its end the hand is stopped, even if a client holds the lease.
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ class ServedHand:
         try:
             self._admission.check_meant(call, in_any_run=is_free)
             self._expire()
-            # First: a request that was begun gets its answer, whichever client commands now.
+            # First: a request that was begun gets its answer, even if another client commands now.
             if not is_free and (job := self._jobs.find(call)) is not None:
                 self._jobs.repeat(job, query)
                 return
@@ -248,7 +248,7 @@ class ServedHand:
         self.end_lease("released", leaves=leaves)
 
         async def release() -> Fields:
-            # What does not come to rest is halted, unless a client has acquired the lease since.
+            # Fingers that do not come to rest are halted, unless a client has acquired the lease since.
             rests = keeps and (await self._fingers.come_to_rest() or self._lease.holder is not None)
             if not (leaves or rests):
                 await self._hand.halt()
@@ -257,7 +257,7 @@ class ServedHand:
         self._jobs.begin(Job("release", call, query), release())
 
     def end_lease(self, reason: str, by: str = "", *, leaves: bool = False) -> None:
-        """Take the lease from its holder. What it set in motion is held; contacts keep their grip."""
+        """Take the lease from its holder. Axes that it set in motion are held; contacts keep their grip."""
         number, holder = self._lease.number, self._lease.end(reason)
         if holder is None:
             return

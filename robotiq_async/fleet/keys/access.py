@@ -1,7 +1,7 @@
 """Access: the role of each client, and the messages of that role.
 
 The access list is a text file beside the certificates; agents use a copy. zenoh compares whole names, without
-patterns, so the list contains every client. A client that is removed from it has no access, whatever its
+patterns, so the list contains every client. A client that is removed from it has no access, even with a valid
 certificate, after the agents have been restarted with the new list. Do not give its name to another client:
 the old certificate would be valid again.
 
@@ -62,7 +62,7 @@ class Right(NamedTuple):
     role: Role
     messages: tuple[str, ...]
     flow: str
-    keys: tuple[str, ...]  # below that of each gripper
+    keys: tuple[str, ...]  # below the key of each gripper
     everywhere: tuple[str, ...] = ()  # of a whole fleet
 
 
@@ -73,7 +73,7 @@ _RIGHTS: Final = (
     Right("presence", Role.READ, _SEE, _IN, (), (f"{ROOT}/*/*/*/alive/*",)),
     Right("present", Role.READ, ("liveliness_token",), _OUT, ("alive/*",)),
     Right("answer info", Role.READ, _ANSWER, _OUT, ("info/*",)),
-    # Clients of version 1 ask there, and get to know that this is another one.
+    # Clients of version 1 ask there: the answer says that this is another version.
     Right("ask old info", Role.READ, _ASK, _IN, ("info",)),
     Right("answer old info", Role.READ, _ANSWER, _OUT, ("info",)),
     Right("ask halt", Role.HALT, _ASK, _IN, ("halt",)),
@@ -141,8 +141,8 @@ def access_control(
 ) -> dict[str, object]:
     """The part of a zenoh configuration that denies everything but the rights of the clients of some agents.
 
-    It is an agent's, or that of a router: there the link of each agent has the other side of each right, for
-    the keys of its host alone.
+    It belongs to an agent or to a router. At a router the link of each agent has the other side of each
+    right, for the keys of its host alone.
     """
     names = [role.common_name(each) for role in CLIENTS for each in clients.of(role)]
     rules = [_rule(right, [_base(site, host) for host in hosts]) for right in _rights_of(names)]
@@ -181,7 +181,7 @@ def rights(role: Role) -> tuple[str, ...]:
 
 
 def _rights_of(names: Sequence[str]) -> list[Right]:
-    # Each client asks under its own name alone: its budget of questions is counted by that.
+    # Each client asks under its own name alone: its budget of questions is counted under that name.
     asking = [Right(f"ask info {name}", Role.READ, _ASK, _IN, (f"info/{name}",)) for name in names]
     return [*_RIGHTS, *asking]
 

@@ -25,7 +25,7 @@ class Credentials:
 
     @property
     def role(self) -> Role | None:
-        """The role in the common name; None if it has none."""
+        """The role in the common name; None if it names no role."""
         role, colon, _ = self.common_name.partition(":")
         known = {each.value: each for each in Role}
         return known.get(role) if colon else None
@@ -53,7 +53,7 @@ def read_credentials(folder: Path) -> Credentials:
 
 
 def common_name(certificate: Path) -> str:
-    """The common name in a certificate, as zenoh compares it; empty if it has none."""
+    """The common name in a certificate, as zenoh compares it; empty if it is missing."""
     return _common_name(_certificate(certificate))
 
 

@@ -1,6 +1,6 @@
 """Bus: the network as agents and clients use it, in one event loop. Over zenoh, or simulated in tests.
 
-PendingQuery is for those who implement one.
+PendingQuery is for implementations of a bus.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ def is_any(_reply: BusReply) -> bool:
 
 
 class MessageKind(Enum):
-    """Kind of a message, by which it is handled first or last."""
+    """Kind of a message. It decides which message is handled first."""
 
     HALT = "halt"  # before all others
     ANSWER = "answer"  # to a request of this process: never dropped
     REQUEST = "request"
     TELEMETRY = "telemetry"  # may wait 1 ms
     # These come last, one in a turn, and each kind gets a share of the loop:
-    OTHERS = "others"  # requests of those who do not command, while somebody does
+    OTHERS = "others"  # requests of clients that do not command, while a client does
     QUESTION = "question"  # of anybody
 
 
@@ -84,7 +84,10 @@ class Bus(Protocol):
         """Return a function that publishes a payload under a key. It never blocks."""
 
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
-        """Call a listener with key and payload of each message under matching keys. Returns what ends it."""
+        """Call a listener with key and payload of each message under matching keys.
+
+        Returns the function that ends it.
+        """
 
     def serve(
         self,
@@ -92,7 +95,7 @@ class Bus(Protocol):
         handler: Callable[[Query], None],
         sort: Sort = is_request,
     ) -> Undo:
-        """Call a handler with each request under matching keys. Returns what ends it.
+        """Call a handler with each request under matching keys. Returns the function that ends it.
 
         Args:
             expression: the keys.
@@ -127,7 +130,7 @@ class Bus(Protocol):
         """
 
     def announce(self, key: str) -> Undo:
-        """Announce a key for as long as this process lives and can be reached. Returns what ends it."""
+        """Announce a key while this process lives and can be reached. Returns the function that ends it."""
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:
         """The matching keys that are announced now; ``timeout`` is in seconds."""
@@ -135,7 +138,7 @@ class Bus(Protocol):
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
         """Call a listener with each matching key and True when it is announced, False when it is gone.
 
-        Keys announced before this call are included. Returns what ends it.
+        Keys announced before this call are included. Returns the function that ends it.
         """
 
     async def unreached(self) -> list[str]:

@@ -31,11 +31,11 @@ def agent_configuration(
     insecure: bool = False,
     trusts_router: bool = False,
 ) -> dict[str, object]:
-    """Configuration of an agent's session. With keys, clients may do only what its access list permits.
+    """Configuration of an agent's session. With keys, its access list decides what clients may do.
 
     Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone. It sees
-    the certificate of the router, not those of the clients: its own list then refuses them all, unless it
-    ``trusts_router``. In that case it has no rules, and everyone whom the router lets through commands.
+    the certificate of the router, not the clients' certificates: its own list then refuses them all, unless
+    it ``trusts_router``. In that case it has no rules, and everyone whom the router lets through commands.
 
     Raises:
         TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file; a router to
@@ -68,7 +68,8 @@ def router_configuration(
 ) -> dict[str, object]:
     """Configuration of a router between the agents of some hosts and the clients in its access list.
 
-    ``keys`` are those of an agent with the name of the router's host; errors as of an agent's configuration.
+    ``keys`` are the keys of an agent with the name of the router's host; errors as of an agent's
+    configuration.
     """
     listen = check_endpoints("listen", listen, has_keys=True)
     clients = AccessList.read_file(keys / ACCESS)
@@ -110,7 +111,7 @@ def _tls(folder: Path) -> Mapping[str, object]:
         "root_ca_certificate": str(folder / AUTHORITY),
         "enable_mtls": True,
         # The host name or IP address of the connection must be in the agent's certificate. Otherwise the
-        # agent of one host could pass for that of another.
+        # agent of one host could pass for the agent of another.
         "verify_name_on_connect": True,
         # An open link would otherwise outlive the certificate.
         "close_link_on_expiration": True,

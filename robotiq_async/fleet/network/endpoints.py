@@ -33,7 +33,7 @@ class Endpoint:
 
 
 def parse_endpoint(what: str, text: object) -> Endpoint:
-    """Parse an endpoint, named ``what`` in messages. TypeError, ValueError: it has not one of the FORMS."""
+    """Parse an endpoint, named ``what`` in messages. TypeError, ValueError: it has none of the FORMS."""
     if not isinstance(text, str):
         raise TypeError(f"{what} must be {ENDPOINT_FORMS}, got {text!r}")
     found = _ENDPOINT.fullmatch(text)

@@ -26,7 +26,7 @@ it, which can block for as long. Clients repeat their requests."""
 
 
 class _Last:
-    """Those of a kind that comes last."""
+    """The messages of a kind that comes last."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.deliveries: deque[Callable[[], None]] = deque()

@@ -23,7 +23,7 @@ class Route:
 
     Attributes:
         connect: zenoh endpoints of agents or routers; empty for an agent on this machine.
-        keys: folder with the certificates of this client; None for none.
+        keys: folder with the certificates of this client; None without certificates.
         insecure: whether to connect beyond this machine without certificates.
     """
 

@@ -93,7 +93,7 @@ class ZenohBus:
         self._session = session
         self._endpoints = endpoints
         self._mailbox = Mailbox()
-        # A sender for each kind: clients that do not read their answers delay only those of that kind.
+        # A sender for each kind: clients that do not read their answers delay only answers of that kind.
         self._repliers = {
             kind: ReplySender()
             for kind in (MessageKind.HALT, MessageKind.REQUEST, MessageKind.OTHERS, MessageKind.QUESTION)

@@ -61,7 +61,7 @@ class Dialog:
         *,
         receive: Callable[[bytes, float], object] = lambda *_: None,
     ) -> None:
-        """``before`` is the last run; ``receive`` takes the status of an answer, and when it was asked."""
+        """``before`` is the last run; ``receive`` takes an answer's status, and the time of the question."""
         self.name = name
         self.loop: asyncio.AbstractEventLoop = asyncio.get_running_loop()
         self.mirror = mirror
@@ -213,7 +213,7 @@ class Dialog:
         return waits or bool(self._cancels) or any(moved_by(each.carries) for each in self._commands.values())
 
     def put(self, axes: Finger, changes: dict[str, int]) -> None:
-        """Send changes of axes, together with those that wait, as soon as less than UNDER_WAY do."""
+        """Send changes of axes with the waiting changes, once fewer than UNDER_WAY commands are open."""
         if self._oldest is None or not self._is_under_this_lease(self._oldest):
             self.clear()
             self._oldest = self.call()
@@ -272,7 +272,7 @@ class Dialog:
             self._received.set_result(None)
 
     def fall_silent(self) -> None:
-        """End the waits of all requests until now, except those that end motion."""
+        """End the waits of all requests until now, except requests that end motion."""
         for errand in self._pending:
             if not errand.is_allowed_after_stop:
                 errand.fail(NoAnswerError(self.name, errand.verb, "the agent fell silent"))

@@ -57,7 +57,7 @@ def no_answer_as_lost_connection() -> Iterator[None]:
 
 
 def of_its_run(call: AgentCall) -> Callable[[BusReply], bool]:
-    """A check that a reply comes from the addressed run of the agent, or any run if none is addressed.
+    """A check that a reply comes from the addressed run of the agent; without an address, from any run.
 
     With two agents for one gripper, the refusal of the wrong one arrives first.
     """
@@ -87,8 +87,8 @@ class Errand:
         timeout: seconds for the answer, from the first copy, while the event loop runs.
         carries: its positions, speeds and forces.
         asked_at: when the wait for an answer began.
-        answered: the answer; None if there is none, or the error that ended the wait.
-        status: that came with the newest answer.
+        answered: the answer; None if none came; or the error that ended the wait.
+        status: the status that came with the newest answer.
         was_empty: whether the last copy came back at once without a reply; for a halt, any of them.
     """
 
@@ -162,7 +162,7 @@ class Errand:
         return (replace(self.call, after=after) if after else self.call).pack()
 
     async def wait(self) -> AgentAnswer | None:
-        """Wait for the answer; None if there is none. NoAnswerError: the wait was ended."""
+        """Wait for the answer; None if none comes. NoAnswerError: the wait was ended."""
         with self._limit as limit:
             await asyncio.wait({self.answered})
         if limit.is_over:

@@ -25,7 +25,8 @@ class ClientLease:
     Attributes:
         is_held: whether the client holds it.
         returns: whether the client tries to get it back by itself when it is lost: by silence, or as the
-            agent was restarted. Not while two agents serve the gripper: it may be that of the wrong one.
+            agent was restarted. Not while two agents serve the gripper: the lease may be from the wrong
+            agent.
         is_over: whether the run ends. A lease that is granted now is not renewed, and expires.
         number: of the lease that the client holds, or held last.
         run: the run of the agent that gave the number.

@@ -39,24 +39,24 @@ SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
 class RemoteHand(Hand):
     """A Robotiq gripper on another host, served by ``robotiq-async agent`` there.
 
-    What all hands promise is in :class:`~robotiq_async.hands.Hand`. Commanding takes a lease, which this
+    :class:`~robotiq_async.hands.Hand` has the promises of all hands. Commanding takes a lease, which this
     hand acquires when it starts and renews from its own event loop. A program that hangs loses the lease, and
-    what it had set in motion is then held. Differences from a hand of this process:
+    axes that it had set in motion are then held. Differences from a hand of this process:
 
     * :meth:`start` looks for the agent (ConnectFailedError, NotAllowedError) and acquires the lease
       (ControlLostError: another client commands). Without the extra ``fleet`` it raises ImportError. A hand
       that only reads activates nothing.
     * :meth:`stop` releases the lease; the agent's hand keeps running. Without the lease it stops no fingers.
-      If the event loop was closed, the agent holds what moves.
+      If the event loop was closed, the agent holds axes that move.
     * Commands raise ControlLostError without the lease, and ConnectionLostError when the agent falls silent:
-      it may have carried them out, and holds what moves within its window. If the agent refuses a command
+      it may have carried them out, and holds axes that move within its window. If the agent refuses a command
       after :meth:`command` has returned, the refusal is logged.
     * :meth:`halt` needs no lease and is repeated until it is answered. If another client commands the
       gripper, it loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
     * :meth:`inhibit` and :meth:`permit` are the agent's, for all its clients: they need a started hand and no
-      lease. The inhibit outlasts leases, and restarts of the agent. A permit lifts what this hand has heard
-      of; a later halt stays, and RobotiqStateError is raised.
-    * Millimetres and fractions follow the ``stroke`` of the agent's hand. What is sent are counts.
+      lease. The inhibit outlasts leases, and restarts of the agent. A permit lifts the halts that this hand
+      has heard of; a later halt stays, and RobotiqStateError is raised.
+    * Millimetres and fractions follow the ``stroke`` of the agent's hand. They are sent as counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
       may be missing, and :meth:`grip_events` follows those that arrived.
 
@@ -65,8 +65,8 @@ class RemoteHand(Hand):
 
     Args:
         address: ``zenoh://SITE/HOST/GRIPPER``; ``?connect=tls/HOST:7447&keys=FOLDER`` says how to get there.
-            What the address leaves out comes from the environment (``ROBOTIQ_ASYNC_CONNECT``,
-            ``ROBOTIQ_ASYNC_KEYS``); the default is an agent on this machine.
+            A missing part comes from the environment (``ROBOTIQ_ASYNC_CONNECT``, ``ROBOTIQ_ASYNC_KEYS``); the
+            default is an agent on this machine.
         control: True acquires the lease when the hand starts, None with the first command that is awaited,
             False never: the hand only reads (and halts) unless :meth:`acquire` is called.
         connect_timeout: seconds for finding the agent, while the event loop runs, 0.1..60.
@@ -109,7 +109,7 @@ class RemoteHand(Hand):
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start
         self._shared_bus = bus
         self._opening: object = None
-        """Identifies the start that opens a bus; None if there is none, or if stop() was called."""
+        """Identifies the start that opens a bus; None without a start, or if stop() was called."""
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -181,7 +181,7 @@ class RemoteHand(Hand):
             await self._running_session().keeper.acquire()
 
     async def take(self) -> None:
-        """Get the lease, also from another client; what that client set in motion is held.
+        """Get the lease, also from another client; axes that this client set in motion are held.
 
         Raises:
             RobotiqError: not started, or the agent does not answer.
@@ -301,7 +301,7 @@ class RemoteHand(Hand):
             with no_answer_as_lost_connection():
                 value: Fields = await dialog.send(call, f"cmd/{name}", timeout=seconds)
         except (asyncio.CancelledError, RobotiqConnectionError):
-            # Also after an error that leaves open whether the request was carried out.
+            # Also after an error that does not say whether the request was carried out.
             dialog.cancel(name, call)
             raise
         return value
@@ -328,7 +328,7 @@ class RemoteHand(Hand):
         return None if self._session is None else self._session.mirror.status
 
     def _is_moving(self) -> bool:
-        assert self._session is not None, "only asked of a hand that runs"
+        assert self._session is not None, "the hand runs"
         newest = self._session.mirror.newest
         return self._session.dialog.is_moving or (newest is not None and newest.is_moving)
 

@@ -5,7 +5,7 @@
 # The agent has the gripper. A run here has three things, which change for different reasons:
 #
 # * the mirror: the last words of the agent about the gripper (mirror.py). Every message names its gripper and
-#   the run of its agent. One about another gripper is dropped, and so is one that is older than the last.
+#   the run of its agent. A message about another gripper is dropped, and so is an older one than the last.
 # * the lease: whether this client commands (lease_state.py). The keeper renews it several times in a window.
 # * the dialog: requests without an answer (dialog.py), each an errand (errand.py).
 #
@@ -170,7 +170,7 @@ class RemoteSession:
         except (RobotiqError, TimeoutError) as error:
             why = str(error) or "no answer in time"
             self.dialog.log.warning(
-                "the release was not acknowledged (%s): the agent is to hold what moves", why
+                "the release was not acknowledged (%s): the agent is to hold the moving axes", why
             )
         finally:
             self._undo()
@@ -298,5 +298,5 @@ class RemoteSession:
 
     def check_control(self) -> None:
         if self.mirror.is_silent:
-            raise ConnectionLostError(f"{self.dialog.name}: the agent is silent: nothing was asked")
+            raise ConnectionLostError(f"{self.dialog.name}: the agent is silent: nothing was sent")
         self.dialog.lease.check()

@@ -52,7 +52,7 @@ class AgentCall:
 
 
 def unpack_call(data: bytes) -> AgentCall:
-    """Parse a request: ProtocolError if it is none, AgentError if it is of another version."""
+    """Parse a request: ProtocolError if it is not a request, AgentError if it has another version."""
     fields = _object("a request", data)
     try:
         call = AgentCall(
@@ -72,7 +72,7 @@ def _is_well_formed(call: AgentCall) -> bool:
         isinstance(values["to"], str)
         and isinstance(values["client"], str)
         and 0 < len(values["client"]) <= 64
-        # Plain text: it is compared as bytes, and half a character (a lone surrogate) has none.
+        # Plain text: it is compared as bytes, and half a character (a lone surrogate) has no bytes.
         and values["client"].isascii()
         and values["client"].isprintable()
         and all(type(values[name]) is int and values[name] >= 0 for name in _INTEGERS)
@@ -115,7 +115,7 @@ class AgentAnswer:
 
 
 def unpack_answer(data: bytes) -> AgentAnswer:
-    """Parse an answer: ProtocolError if it is none, AgentError if it is of another version."""
+    """Parse an answer: ProtocolError if it is not an answer, AgentError if it has another version."""
     fields = _object("an answer", data)
     try:
         begun = fields.get("begun")

@@ -29,7 +29,7 @@ SETTINGS: Final = ("speed", "force")
 _SETTABLE: Final = ("position", *SETTINGS)
 Setting = tuple[Finger, str]
 """One axis, and "position", "speed" or "force"."""
-_USUAL_FINGERS: Final = {"move": 7}  # the axes of a command that names none; 15 of all others
+_USUAL_FINGERS: Final = {"move": 7}  # the axes of a command that names no axes; 15 for all other commands
 
 
 def asked_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:

@@ -46,7 +46,7 @@ class RefusedError(RobotiqError):
 class GripperConnection:
     """A hand, from the configuration of the node to its cleanup.
 
-    A stop ends all requests that came before it, also those that have not begun, and no other request is
+    A stop ends all earlier requests, also requests that have not begun, and no other request is
     accepted until the stop is answered.
 
     Attributes:
@@ -258,7 +258,7 @@ class PendingStop:
                 Log(self._hand.name).error("the link is back, and the fingers MAY STILL MOVE: %s", error)
                 return
             else:
-                Log(self._hand.name).warning("the link is back, and what still moved has been stopped")
+                Log(self._hand.name).warning("the link is back, and axes that still moved were stopped")
                 return
 
 

@@ -32,7 +32,7 @@ from .unasked import UnaskedGoals
 
 Configured = tuple[GripperConnection, JointStates, NodeSettings]
 RECEIPT_S: Final = 3.0  # seconds for clients to receive results: milliseconds, unless one has crashed
-RECEIPT_LOOK_S: Final = 0.01  # seconds between two looks at that
+RECEIPT_LOOK_S: Final = 0.01  # seconds between two checks of the receipt
 
 
 class _ResultServer(ActionServer):  # type: ignore[misc]  # rclpy is not here
@@ -59,7 +59,7 @@ class GripperAction:
     ) -> None:
         """Offer the action; the callbacks of ``group`` may overlap.
 
-        ``configured`` returns the configuration of the node, and raises RefusedError if there is none.
+        ``configured`` returns the configuration of the node; it raises RefusedError if the node has none.
         """
         self._log = node.get_logger()
         self._bridge = bridge
@@ -88,7 +88,7 @@ class GripperAction:
     async def results_asked(self) -> None:
         """Wait, in the loop, until clients have requested the results of their goals, for seconds at most."""
         if number := self._unasked.number:
-            self._log.info(f"results that no client has asked for yet: {number}; the node waits for that")
+            self._log.info(f"results that no client has requested yet: {number}; the node waits for that")
         await self._unasked.wait()
         self._last.publish(GoalStatusArray())
 
@@ -134,7 +134,7 @@ class GripperAction:
         handle.execute()
 
     def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
-        # Always accept: of a request that cancels several goals, rclpy skips the goal after one that refuses.
+        # Always accept: if a request cancels several goals, rclpy skips the goal after a goal that refuses.
         # Submitted, not awaited: this thread must mark the goal as canceling before it ends.
         try:
             connection, _, _ = self._configured()

@@ -21,7 +21,7 @@ OURS: Final = "gripper/"
 """Before the names of all that belongs to the gripper."""
 _TIMESTEP: Final = 0.002
 _TIMESTEPS: Final = (0.0001, 0.004)
-"""Those of a user's own world: with 10 ms no motion of a gripper ends, and with 20 ms it flies apart."""
+"""Timesteps that a user's world may have: with 10 ms no motion ends, with 20 ms a gripper flies apart."""
 _NEEDED: Final = {
     "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
     "equality": mujoco.mjtDisableBit.mjDSBL_EQUALITY,

@@ -37,7 +37,7 @@ _AT_REST_S: Final = 0.3
 _NEAR: Final = 0.6
 """Counts from the target at which an axis has arrived."""
 _SLIPPED: Final = 2.0
-"""Counts that a jaw moves on after a contact before the part counts as lost."""
+"""Counts that a jaw moves after a contact before the part counts as lost."""
 _LOCK: Final = 4.0
 """Times its full force that a locked motor withstands (ESTIMATE): gears that lock themselves."""
 _BACK_OFF: Final = 4.0
@@ -47,7 +47,7 @@ _BLOCKED_S: Final = 0.02
 _BEYOND: Final = 255.0
 """Counts beyond its target that the reference of a blocked axis may go, for the force of the request."""
 _FREED: Final = 4.0
-"""Counts that a blocked axis moves on when the body in its way has gone: more than a part yields."""
+"""Counts that a blocked axis moves when the body in its way has gone: more than a part yields."""
 _LEAD: Final = 1.3
 """Share of the way at which the servo gives its full force that the reference may be ahead."""
 
@@ -158,7 +158,7 @@ class MotorDrive:
             return self._value(self._reference), _LOCK * (self._forces[1] * self._lever())
         position, sign, most = self.position, self._sign, self._rate() * step_s
         limit, back = self._limit(), self._pushed_back()
-        # However near the target is: a body in the way is pressed with the force of the request.
+        # Also near the target: a body in the way is pressed with the force of the request.
         way = self._aim + sign * _BEYOND * self._is_blocked - self._reference
         moved = min(max(way, -most), most)
         lead = _LEAD * limit / self._stiffness + back + 2 * most
@@ -187,8 +187,8 @@ class MotorDrive:
     def _pushed_back(self) -> float:
         """Counts that a finger was pushed back.
 
-        That turns no gear: it meets the servo besides the force of the request. The pads of a jaw have one
-        motor, and push each other nowhere.
+        That turns no gear: the servo bears it in addition to the force of the request. The pads of a jaw have
+        one motor, and do not push each other back.
         """
         if not self._locks:
             return 0.0

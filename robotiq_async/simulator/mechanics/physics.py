@@ -72,7 +72,7 @@ class Physics:
         self._until = 0.0
 
     def attach(self, model: Model, clock: Callable[[], float], speedup: float) -> None:
-        """Make the world, for a gripper of this model, which moves by its clock.
+        """Make the world for a gripper of this model; the world's time is the gripper's clock.
 
         Raises:
             ImportError: MuJoCo is not installed.
@@ -82,7 +82,7 @@ class Physics:
         from .world import World  # noqa: PLC0415  # MuJoCo takes a quarter of a second
 
         if self._world is not None:
-            raise RuntimeError("physics has a gripper already: make one for each")
+            raise RuntimeError("this physics has a gripper already: make one for each")
         self._world = World(model, self._scene)
         if self._threaded:
             self._stepper = Stepper(self._world, self._lock, clock, speedup)
@@ -105,7 +105,7 @@ class Physics:
             self._stepper.start()
 
     def stop(self) -> None:
-        """End the thread with the last of those who started it, and wait for it: for one step at most."""
+        """End the thread when its last user stops, and wait for its end: for one step at most."""
         self._users = max(self._users - 1, 0)
         if self._stepper is not None and not self._users:
             self._was_stopped = True
@@ -170,7 +170,7 @@ class Physics:
             self._made.lift(height)
 
     def control(self, actuator: str, value: float) -> None:
-        """Set the control of an actuator of the scene's file: of an arm that carries the gripper.
+        """Set the control of an actuator in the scene's file, as of an arm that carries the gripper.
 
         Args:
             actuator: its name in the file.

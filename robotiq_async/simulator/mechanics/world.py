@@ -174,9 +174,9 @@ class World:
         return float(self._data.joint(name).qpos[0])
 
     def _own(self, names: Iterable[str]) -> list[str]:
-        """Those of the user, who has named them."""
+        """The names that come from the user's file."""
         if self._mount is not None:
-            raise RuntimeError("physics: only a scene of a file has actuators and joints of its own")
+            raise RuntimeError("physics: only a scene from a file has actuators and joints to set or read")
         return [name for name in names if name and not name.startswith(OURS)]
 
     def take_away(self) -> None:

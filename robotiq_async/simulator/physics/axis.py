@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 # something with full force, for they lock themselves.
 #
 # The rest is made up to fit: the current of a slower motion, the scissor (taken for finger A), and the peak
-# of a contact. By the manual the force fixes the highest current of a motion (2014, p. 47); by the thesis
-# (figures 13 to 15, without numbers) the peak grows with the force, at once on something rigid and bit by bit
-# in foam.
+# of a contact. The manual says that the force fixes the highest current of a motion (2014, p. 47); in the
+# thesis (figures 13 to 15, without numbers) the peak grows with the force, at once on something rigid and bit
+# by bit in foam.
 _SHARE_OF_FRICTION: Final = 0.5
 # Above the current of the fastest motion, or it would stop itself; three fingers at once stay within the
 # 1.5 A that the manual lets the whole gripper take.
@@ -308,7 +308,7 @@ class Axis:
         return _Path(sign * min(sign * end, sign * stopped), ObjectStatus.AT_POSITION)
 
     def _overshoot(self, goal: Goal) -> int:
-        """Counts by which the axis will overshoot: none at a stop, or if the goal is a reading."""
+        """Counts by which the axis will overshoot: 0 at a stop, or if the goal is a reading."""
         if goal.is_reading or not self.low < goal.position < self._closed_stop(goal):
             return 0
         return self._spread.overshoot(goal.position)

@@ -31,8 +31,8 @@ class Bodies(NamedTuple):
     """The places of all bodies at one moment.
 
     Attributes:
-        joints: radians, or metres of one that slides, by the names of the description.
-        parts: the shapes of the parts; none while they are out of the way, as in an activation.
+        joints: radians, or metres for a sliding joint, by the names of the description.
+        parts: the shapes of the parts; empty while they are out of the way, as in an activation.
     """
 
     joints: Mapping[str, float]

@@ -100,11 +100,11 @@ class GripperController:
     Attributes:
         model: of the gripper.
         axes: in the order of the model.
-        driven: the same if a mechanism moves them, and none otherwise.
+        driven: the same axes if a mechanism moves them; else empty.
         habits: its choices that the manual leaves open.
         request: the image in force.
         progress: gIMC.
-        faults: the faults that are present, apart from those that follow from the request and the progress.
+        faults: the present faults, apart from faults that follow from the request and the progress.
         fail_activation: the next activation ends in fault 0x0D; reset to False when it does.
         controller_fault: kFLT, of the controller before a jaw.
         is_asleep: the next image with rACT = 1 wakes the gripper, and moves nothing.
@@ -322,7 +322,7 @@ class GripperController:
         return None if self._obeyed.individual_scissor else self._obeyed.mode
 
     def _obeyed_of(self, request: Request) -> Request:
-        """The part of an image that acts: all of it, unless it wakes the gripper; then it moves nothing."""
+        """The part of an image that acts: all of it, unless it wakes the gripper, which moves nothing."""
         if not self.is_asleep or not request.activate:
             return request
         self.is_asleep = False
@@ -370,7 +370,7 @@ class GripperController:
         self._note(time)
 
     def _begin_step(self, time: float) -> None:
-        """Begin a step. One of an activation lasts as long wherever it begins."""
+        """Begin a step. A step of an activation lasts as long from any position."""
         half = self.habits.activation_time / 2 if self.progress is Initialization.ACTIVATING else 0.0
         self._step_lasts_until = time + half
 
@@ -459,7 +459,7 @@ class GripperController:
 
 @cache
 def usual_motion(model: Model) -> MotionProfile:
-    """The motion of a model by the figures that the driver expects of it."""
+    """The motion of a model, with the figures that the driver expects."""
     speeds = SpeedCalibration.usual(model)
     times = (speeds.closing_time(speed) for speed in range(256))
     return speeds.profile or MotionProfile.of_closings(speeds.source, 3, model.stroke.counts, times)

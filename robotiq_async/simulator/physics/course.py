@@ -13,7 +13,7 @@ _LEFT_TO_PRESS: Final = 0.51
 _LAST_COUNT: Final = 0.5
 """Share of its pressing after which the last count comes, if that is before the report."""
 _EARLIEST: Final = 0.8
-"""The greatest share of its pressing by which the report comes early."""
+"""The report of a contact comes early by at most this share of the pressing."""
 
 
 class Knot(NamedTuple):

@@ -39,9 +39,9 @@ _CYCLE: Final = 0.005
 class SimulatedGripper:
     """A gripper that behaves like the real one, as far as public sources go: a 3-Finger, or a sibling.
 
-    Nothing runs in the background: the gripper catches up with its clock whenever it is read, written or
-    changed. Motions, contacts, faults and delayed requests happen at their exact times, so a result does not
-    depend on how often it is read. Use one from one thread only.
+    Nothing runs in the background: the gripper catches up with its clock at each read, write or change.
+    Motions, contacts, faults and delayed requests happen at their exact times, so a result does not depend on
+    how often it is read. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Motions take the time of
     :mod:`robotiq_async.calibration.motion_profile`: measured closings of a 3-Finger, whose scissor
@@ -49,7 +49,7 @@ class SimulatedGripper:
     siblings an estimate. Motor currents are in :mod:`.axis`; how far axes miss their requests, in
     :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
 
-    Choices where no source settles the behaviour; those that can be changed are in :class:`Habits`:
+    Choices where no source settles the behaviour; :class:`Habits` has the choices that can be changed:
 
     * A finger that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
     * A jaw begins a motion late only from rest: on its way it takes a new request at once, and turns at once.
@@ -83,8 +83,8 @@ class SimulatedGripper:
 
         Args:
             clock: gives the time in seconds; must not go backwards.
-            device_cycle: simulated seconds between a write and its effect, 0 for none; None for 5 ms on a
-                3-Finger and none on a sibling, whose next status has the echo (recorded of a 2F-85).
+            device_cycle: simulated seconds between a write and its effect; None for 5 ms on a 3-Finger and 0
+                on a sibling, whose next status has the echo (recorded on a 2F-85).
             speedup: simulated seconds in one second of the clock. All motions and sequences become faster.
             scissor_limit: a software limit of the scissor in counts. A request beyond it is replaced by the
                 limit and reported as reached while the echo keeps the request.
@@ -202,7 +202,7 @@ class SimulatedGripper:
     def strand(self) -> None:
         """Lose the activation, and keep rACT: gACT is 1 and gIMC 0, and nothing moves until rACT is cleared.
 
-        A 2F-85 was found so, by a client that then reset and activated it. What had come before is not known.
+        A client found a 2F-85 in this state, and then reset and activated it. The cause is not known.
         A gripper without power stays as it is.
         """
         self._catch_up()
@@ -229,7 +229,7 @@ class SimulatedGripper:
 
         An axis that has passed the position already has the object behind it: no contact until it comes
         from the other side. Each axis has room for one object per direction; a second replaces the first.
-        An axis in contact stays there, wherever the object is now.
+        An axis in contact stays there, even if the object is elsewhere now.
 
         Args:
             fingers: the axes it is in the way of.
@@ -421,7 +421,7 @@ class SimulatedGripper:
 
     @property
     def _now(self) -> float:
-        """Simulated seconds since the gripper was made, by its clock."""
+        """Simulated seconds on its clock since the gripper was made."""
         return (self._clock() - self._began) * self._speedup
 
     @property

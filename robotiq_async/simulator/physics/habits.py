@@ -24,10 +24,10 @@ class Habits:
     silent the source named here.
 
     Attributes:
-        activation_time: seconds that an activation takes at least, wherever it begins; half of them to close
+        activation_time: seconds that an activation takes at least, from any position; half of them to close
             the fingers, half to open them.
-        status_lag: seconds by which gDT and gSTA trail the rest of the status. By the manual they are
-            valid with the echo; the vendor's own software for the two-finger grippers waits up to 0.2 s.
+        status_lag: seconds by which gDT and gSTA trail the rest of the status. The manual says that they are
+            valid with the echo; the vendor's software for the two-finger grippers waits up to 0.2 s.
         silence_fault: after so many seconds without a message gFLT is 0x09 in the first status that is read,
             and in no other (siblings: 1 s). A write that comes first takes it away.
         write_spacing: a write that comes less than so many seconds after the last one that was kept is

@@ -49,7 +49,7 @@ class Spread:
         return self._figure("closed", -1, 1)
 
     def overshoot(self, position: int) -> int:
-        """Counts, or none, by which the axis overshoots a request between its stops."""
+        """Counts by which the axis overshoots a request between its stops; may be 0."""
         return self._figure(f"goes past {position}", 0, _TOLERANCE)
 
     def contact(self, position: int) -> int:

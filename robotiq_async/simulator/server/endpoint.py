@@ -80,7 +80,7 @@ class SimulatorEndpoint(ABC):
     @property
     @abstractmethod
     def address(self) -> str:
-        """The address by which a client finds this gripper."""
+        """The address of this gripper, for a client."""
 
     @property
     def _query(self) -> str:
@@ -122,15 +122,15 @@ class SimulatorEndpoint(ABC):
             await wait_shielded(ending)
 
     def cut(self, *, reset: bool = False) -> None:  # noqa: ARG002
-        """Drop all connections. On a serial line there are none."""
+        """Drop all connections. Does nothing on a serial line."""
         self._check_running()
 
     def refuse(self) -> None:
-        """Refuse new connections. On a serial line there are none."""
+        """Refuse new connections. Does nothing on a serial line."""
         self._check_running()
 
     async def accept(self) -> None:
-        """Accept connections again. On a serial line there are none."""
+        """Accept connections again. Does nothing on a serial line."""
         self._check_running()
 
     @abstractmethod

@@ -81,7 +81,7 @@ def take_rtu(inbox: bytearray, unit: int) -> Frame | None:
 
 
 def _rtu_size(inbox: bytearray) -> int | None:
-    """The bytes of the first frame; None while its length is not known, 0 if it has none."""
+    """The length of the first frame in bytes; None while it is not known, 0 if the bytes begin no frame."""
     if len(inbox) < 2:
         return None
     if inbox[1] not in RTU_FUNCTIONS:

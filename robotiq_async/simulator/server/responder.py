@@ -91,7 +91,7 @@ class Responder(ABC):
             self.fault_injector.left()
 
     def fail(self, error: PhysicsError) -> None:
-        """Drop all clients for good: the gripper has no state any more that could be told."""
+        """Drop all clients for good: the gripper has no state any more to report."""
         if self.failure is None:
             self.failure = error
             self.failed.set()

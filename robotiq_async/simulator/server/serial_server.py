@@ -124,7 +124,7 @@ class _RtuEndpoint(SimulatorEndpoint):
     def _share(self, others: Mapping[int, SimulatedGripper]) -> None:
         units = [check_int("a unit id of others", unit, 1, 247) for unit in others]
         if self.device_id in units:
-            raise ValueError(f"each gripper at a line needs a unit id of its own, got {self.device_id} twice")
+            raise ValueError(f"each gripper at a line needs a different unit id, got {self.device_id} twice")
         self.others = {unit: LineNeighbour(self, others[unit], unit) for unit in units}
 
     def _connection(self) -> asyncio.Protocol:
@@ -147,7 +147,7 @@ class LineNeighbour(_RtuEndpoint):
 
     @property
     def address(self) -> str:
-        """That of the line."""
+        """The address of the line."""
         return self._server.address
 
     async def _open(self) -> None:
@@ -189,7 +189,7 @@ class LineEnd(asyncio.Protocol):
 class SerialSimulatorServer(_RtuEndpoint):
     """Serves a simulated gripper over Modbus RTU at 115200 baud, 8N1.
 
-    Bytes take the time that they take at that rate, both ways, and a reply begins 0.8 ms after its request
+    Bytes take their time at that rate, both ways, and a reply begins 0.8 ms after its request
     (:attr:`reply_silence`): a read of 8 registers takes 3.3 ms, a write 3.7 ms. Timers make that longer by up
     to a millisecond, and never shorter.
 
@@ -352,7 +352,7 @@ class SerialConnection(Connection):
     """The other end of a serial line, which has no connections, no packets and no flow control."""
 
     def __init__(self, responder: Responder, reply_silence: float | None, unit: int) -> None:
-        """Make a connection with the time of its bytes; None for one where they take none."""
+        """Make a connection with the time of its bytes; None if bytes take no time."""
         super().__init__(responder)
         self._others: list[SerialConnection] = []
         """The ends of other grippers at the same place of the line."""
@@ -428,7 +428,7 @@ class SerialConnection(Connection):
 
 
 def _begins_anew(pause: float, data: bytes, unit: int) -> bool:
-    """Whether bytes are the beginning of a frame and not the rest of one, judged by the pause before them.
+    """Whether bytes begin a frame and do not continue one: the pause before them decides.
 
     In between, when it may be the line or the machine that paused, a whole request is a beginning: by
     chance the rest of a frame has its checksum once in 65,536 times.

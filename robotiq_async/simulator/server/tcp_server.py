@@ -83,7 +83,7 @@ class SimulatorServer(SimulatorEndpoint):
         self._responder.hang_up(reset=reset)
 
     def refuse(self) -> None:
-        """Refuse new connections until :meth:`accept`; those that exist stay.
+        """Refuse new connections until :meth:`accept`; present connections stay.
 
         Raises:
             RuntimeError: the server is not running.
@@ -132,7 +132,7 @@ class SimulatorServer(SimulatorEndpoint):
             self._listener = await loop.create_server(
                 self._connection, self._host, self._port, reuse_address=True
             )
-        except UnicodeError as error:  # of a name that can be none
+        except UnicodeError as error:  # the name cannot be a host name
             raise OSError(f"{self._host} cannot be resolved: {error}") from error
         if not self._listener.sockets:
             # asyncio takes every socket that cannot be made for one of a family that is not known here.

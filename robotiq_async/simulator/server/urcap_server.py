@@ -69,8 +69,8 @@ _ABOUT: Final = {
     "MSC": "0",
     "VST": "0",
 }
-"""Names that say something about gripper and driver: state and version of the driver, version of the
-firmware, serial number, cycles. All values but DRI and VER are made up; the last three are not explained."""
+"""Names that describe gripper and driver: state and version of the driver, version of the firmware, serial
+number, cycles. All values but DRI and VER are made up; no source explains the last three."""
 
 
 _VARIABLES: Final = frozenset({"SID", *_STATUS_FIELDS, *_REQUEST_FIELDS, *_ABOUT})
@@ -214,7 +214,7 @@ class UrcapSimulatorServer(SimulatorServer):
     """Serves a simulated jaw as Robotiq's URCap on a UR controller does, to any number of clients.
 
     A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
-    the ``ack`` of a SET without one, as clients that ran on hardware want it. Several lines may come in one
+    and the ``ack`` of a SET does not, as clients that ran on hardware expect. Several lines may come in one
     write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
     so is the beginning of a longer line that comes in pieces, if it is a GET. All variables of a SET act
     at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.

@@ -163,7 +163,7 @@ def wrong_count(reply: Reply, value: float) -> Parts:
 
 
 def wrong_transaction(reply: Reply, value: float) -> Parts:
-    """The reply carries the number of the transaction before."""
+    """The reply has the number of the transaction before."""
     number = (int.from_bytes(reply.frame[:2], "big") - 1) & 0xFFFF
     return ((0.0, number.to_bytes(2, "big") + reply.frame[2:]),)
 
@@ -179,7 +179,7 @@ def wrong_protocol(reply: Reply, value: float) -> Parts:
 
 
 def wrong_echo(reply: Reply, value: float) -> Parts:
-    """The reply to a write names the register next to the one that was written; to FC23 it names none."""
+    """The reply to a write names the register after the written one; a reply to FC23 names no register."""
     pdu = reply.pdu
     if reply.has_registers:
         return reply.changed()

@@ -9,11 +9,11 @@
 #               of several troubles about one request or reply the oldest decides. A trouble that needs only
 #               the reply is a function of corruption.py; one that needs earlier ones keeps them in deliver()
 #   on state    _do() changes the gripper or the server, and _undo() restores it. Troubles of one kind overlap
-#               in any order, so those that last are applied again
+#               in any order, so the troubles that last are applied again
 #   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
 #
-# A trouble of new connections leaves those alone that exist. end() completes its work even when cancelled,
-# and run() ends every trouble of its plan however it is left.
+# A trouble of new connections does not affect present connections. end() completes its work even when
+# cancelled, and run() ends every trouble of its plan, also after an error or a cancellation.
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Ongoing:
 class FaultInjector:
     """Applies troubles to one simulator. Troubles may overlap.
 
-    Of those that are about the same reply the oldest acts; with none of them, the simulator's policy.
+    If several troubles concern one reply, the oldest acts; if no trouble does, the simulator's policy acts.
 
     Attributes:
         is_multiplexed: whether clients share a connection to the gripper that outlives theirs.
@@ -136,7 +136,7 @@ class FaultInjector:
                 raise ValueError(f"controller-fault does not fit a {model}: it has no kFLT")
 
     async def begin(self, trouble: Trouble) -> Ongoing:
-        """Let a trouble begin now, whenever its plan would. :meth:`end` ends it.
+        """Let a trouble begin now; its times are ignored. :meth:`end` ends it.
 
         Raises:
             ValueError: it does not fit this kind of link, or this gripper.
@@ -234,7 +234,7 @@ class FaultInjector:
     # Called by the simulator.
 
     def lets_in(self, present: int) -> bool:
-        """Whether a new connection is let in, beside those that there are."""
+        """Whether a new connection is let in, beside ``present`` connections."""
         if present and self._lasting("one-connection-only"):
             return False
         if self._lasting("wake-needed"):

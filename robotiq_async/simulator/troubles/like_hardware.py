@@ -14,8 +14,8 @@ no ``status-lag``       2F, Hand-E     pyRobotiqGripper's and the vendor's examp
 no ``write-spacing``    2F, Hand-E     the vendor's loop writes 100 times a second, and up to 250 times
 ======================  =============  ====================================================================
 
-Left out are those with one source or none: ``echoed-limits``, ``e-stop``, ``wake-needed``, ``idle-reset``,
-``function-3-only``, ``one-connection-only``. Nothing of it has been measured by us.
+Troubles with at most one source are left out: ``echoed-limits``, ``e-stop``, ``wake-needed``, ``idle-reset``,
+``function-3-only``, ``one-connection-only``. We have measured none of these habits.
 """
 
 from __future__ import annotations

@@ -80,12 +80,12 @@ class Likeness:
     Attributes:
         model: of the gripper.
         link: "tcp", "rtu", "rtu+tcp", "urcap" or "tunnel".
-        device_id: the only unit id that answered; None if several did, or the report has none.
+        device_id: the only unit id that answered; None if several did, or if the report has no unit id.
         habits: its habits.
         motion: its motion in time; None for the usual one.
         ends: its readings open, and closed with the least force; None for the usual ones.
-        device_cycle: seconds from a write to its effect; None for the usual ones.
-        exchange_s: seconds of an exchange; None if the report has none.
+        device_cycle: seconds from a write to its effect; None for the usual time.
+        exchange_s: seconds of an exchange; None if the report has no figure.
         spread: whether axes stop beside their requests.
         seed: the number of the gripper: of a 3-Finger one with its readings.
         scissor_limit: the ends of the scissor; None for the usual ones.
@@ -245,7 +245,7 @@ class _ReportReader:
         echo = self._seconds("write.echo", "p50_ms")
         if echo:
             # Counted from its acknowledgement, an exchange after it was sent; and reads follow one another:
-            # the one that shows it was sent half an exchange later than needed.
+            # the read that shows the effect was sent half an exchange later than needed.
             return echo + self._exchange_s / 2
         counts, profile = self._figure("stop.halt", "counts"), self._motion()
         if echo is None or self._exchange_s < _SLOW_LINK_S or not counts or profile is None:
@@ -255,7 +255,7 @@ class _ReportReader:
         return float(min(max(0.0, took), 0.85 * self._exchange_s))
 
     def _silence(self) -> float | None:
-        """Seconds of silence that bring fault 0x09: between those that did not and those that did."""
+        """Seconds of silence that bring fault 0x09: between the longest without and the shortest with it."""
         shown = self._figure("read.silence", "faults") or []
         faulty = [seconds for seconds, first, _ in shown if first == Fault.COMMUNICATION_NOT_READY]
         if not faulty:

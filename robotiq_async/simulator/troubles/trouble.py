@@ -35,11 +35,11 @@ class TroubleKind(NamedTuple):
     Attributes:
         meaning: one line about it.
         lasts: its duration by default: 0 for an event, infinity for a condition.
-        value: its default value; None if it has none.
+        value: its default value; None for a kind without a value.
         low: the least value.
         high: the greatest value.
         corruption: its change of a reply, if it has one.
-        on: the requests whose replies it can be about.
+        on: the requests whose replies it can affect.
         link: tcp for a trouble of connections, or of frames of Modbus TCP; rtu for one of frames of a line;
             urcap for one of the text port.
         habit: the habit of the gripper that it changes, if it does.
@@ -314,7 +314,7 @@ class Trouble:
 
     @property
     def amount(self) -> float:
-        """Its value, or the default; 0 if it has none."""
+        """Its value, or the default; 0 for a kind without a value."""
         return (KINDS[self.kind].value if self.value is None else self.value) or 0.0
 
     def is_about(self, *, write: bool) -> bool:
@@ -365,7 +365,7 @@ def _checked_value(name: str, kind: TroubleKind, value: object) -> float:
 
 
 def parse_troubles(text: str) -> list[Trouble]:
-    """Read troubles: one a line, or several with ``;`` between them. What follows a ``#`` is a remark.
+    """Read troubles: one a line, or several with ``;`` between them. Text after a ``#`` is a remark.
 
     Raises:
         ValueError: a line that is not a trouble, with the reason.

@@ -26,7 +26,7 @@ _PAD_FRICTION: Final = (0.9, 0.02, 0.0005)
 silicone on oiled steel."""
 _BODY_FRICTION: Final = (0.4, 0.005, 0.0001)
 _GAINS: Final = {False: (500.0, 7.0, 0.02), True: (30_000.0, 500.0, 2.0)}
-"""Stiffness, damping and inertia of the geared motor of a drive that turns, and of one that slides."""
+"""Stiffness, damping and inertia of the geared motor of a turning drive, and of a sliding drive."""
 _SHARED_GAINS: Final = (150.0, 2.5, 0.006)
 """The same of a drive that pulls a tendon."""
 _DAMPING: Final = {False: 0.02, True: 5.0}

@@ -41,7 +41,7 @@ class Shape:
         size: of a box the three edges; of a cylinder radius and length; of a sphere the radius.
         origin: in the frame of the link.
         material: one of :data:`MATERIALS`.
-        name: of the shape; empty if it has none.
+        name: of the shape; may be empty.
     """
 
     kind: str
@@ -94,10 +94,10 @@ class Joint:
         child: name of the child link.
         origin: the frame of the child at 0, in the frame of the parent.
         axis: in the frame of the child; None when the joint is fixed.
-        lower: the smallest value, in radians, or metres of one that slides.
+        lower: the smallest value, in radians, or in metres if it slides.
         upper: the largest.
         slides: it moves along its axis, and does not turn about it.
-        effort: the most its drive gives, in N m, or N of one that slides.
+        effort: the most its drive gives, in N m, or in N if it slides.
         velocity: the fastest it moves, in rad/s, or m/s.
         mimic: the joint it follows; None if it is free.
     """
@@ -133,7 +133,7 @@ class Tendon:
         joints: the weight of each joint, by name.
         lower: the smallest value of the sum; None for no limit.
         upper: the largest.
-        stiffness: of a spring that pulls the sum to 0, in N m/rad; 0 for none.
+        stiffness: of a spring that pulls the sum to 0, in N m/rad; 0 without a spring.
     """
 
     name: str
@@ -184,7 +184,7 @@ class HandModel:
         return sum(link.mass for link in self.links.values())
 
     def completed(self, values: Mapping[str, float]) -> dict[str, float]:
-        """The value of every joint that moves, those that follow another included.
+        """The value of every joint that moves, also of joints that follow another.
 
         Args:
             values: radians or metres by the names of joints; missing ones are at 0, unknown ones are ignored.

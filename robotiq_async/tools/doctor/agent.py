@@ -87,7 +87,7 @@ class _MessageSorter:
         self._mark = name.mark
         self.statuses: list[StatusMessage] = []  # about the gripper
         self.misrouted = 0  # number of messages about another gripper
-        self.unreadable = ""  # the error of the last unreadable message; empty if there was none
+        self.unreadable = ""  # the error of the last unreadable message; empty before the first
 
     def hear(self, _key: str, payload: bytes) -> None:
         try:

@@ -182,7 +182,7 @@ def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
 
 
 async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
-    # Also returns the seconds until the reply. Closes the link when there is none.
+    # Also returns the seconds until the reply. Closes the link when no reply comes.
     loop = asyncio.get_running_loop()
     try:
         await link.open()
@@ -231,8 +231,8 @@ def _advice_for_opening(address: Address, why: str) -> str:
         return "Install it, and run doctor again."
     if address.kind == "rtu":
         return (
-            "robotiq-async ports lists the ports of this computer; what was plugged in is in dmesg (Linux), "
-            "the System Report (macOS) or the Device Manager (Windows)."
+            "robotiq-async ports lists the ports of this computer; dmesg (Linux), the System Report (macOS) "
+            "or the Device Manager (Windows) lists the devices that were plugged in."
         )
     return f"It accepted a connection before and refuses one now. {ALONE}: stop the other."
 
@@ -277,7 +277,7 @@ def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes:
             "serves one client at a time and has another."
         )
     if isinstance(error, ProtocolError):
-        return "What answers is not this gripper: its registers are elsewhere, or it does not speak Modbus."
+        return "The device is not this gripper: its registers are elsewhere, or it does not speak Modbus."
     if address.kind == "rtu":
         return LOST_PORT
     return f"It closes the connection when asked. {ALONE}, or not speak Modbus."
@@ -300,7 +300,7 @@ def _advice_for_a_line(address: Address, error: RobotiqConnectionError, echoes: 
         )
     if "refuses" in str(error):
         return (
-            "Something answers, and refuses to be read: another device, or one that has its registers "
+            "Something answers, and refuses to be read: another device, or a gripper with its registers "
             "elsewhere (request_address, status_address)."
         )
     if "checksum" in str(error):
@@ -342,7 +342,7 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: ReportFinding)
 
 
 def report_silence(status: RobotiqStatus, report: ReportFinding) -> None:
-    """Report a status that tells nothing."""
+    """Report a status without information."""
     if not any(status.registers):
         found = "all registers read 0: nothing shows that this is a gripper"
         advice = (

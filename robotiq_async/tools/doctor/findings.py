@@ -22,7 +22,7 @@ class Finding:
     level: Level  # severity
     what: str  # the subject of the check
     found: str  # the result
-    advice: str = ""  # the remedy; empty if there is none
+    advice: str = ""  # the remedy; may be empty
 
 
 ReportFinding = Callable[[Finding], None]

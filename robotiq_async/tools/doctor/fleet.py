@@ -245,7 +245,7 @@ async def _try_without(endpoint: Endpoint, keys: Path, report: ReportFinding) ->
         stays = False
     if stays:
         found = f"{endpoint.text}: clients without a certificate are accepted, too"
-        advice = "What listens there is no agent with keys, or a router without mutual TLS. Stop it."
+        advice = "The program there is no agent with keys, or a router without mutual TLS. Stop it."
         report(Finding(Level.BAD, "no certificate", found, advice))
     else:
         report(Finding(Level.GOOD, "no certificate", "refused, as it must be"))

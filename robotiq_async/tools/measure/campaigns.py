@@ -34,9 +34,9 @@ from ..errors import MeasuringError
 
 RUN_PAUSE_S: Final = 0.3
 """Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""
-ATTEMPTS: Final = 20  # attempts at a run: one in which the event loop was blocked is repeated
+ATTEMPTS: Final = 20  # attempts at a run: a run in which the event loop was blocked is repeated
 TOLERATED: Final = 0.01  # share of a run for which the event loop may be blocked, apart from two polls
-STROKE_SLACK: Final = 5  # counts by which the readings of a full closing may miss those that the manual gives
+STROKE_SLACK: Final = 5  # counts by which the readings of a full closing may differ from the manual's
 GRASP_S: Final = 1.0  # seconds of the gripper's time that are recorded after the fingers have stopped
 CURRENT_MA: Final = 2550  # the highest current that a status can report
 FINGERS: Final = (Finger.A, Finger.B, Finger.C)
@@ -250,7 +250,7 @@ def origin_beside(path: Path) -> Path:
 
 
 def read_origin(path: Path) -> dict[str, str]:
-    """Read the origin of a table; empty if it has none."""
+    """Read the origin of a table; empty if none was recorded."""
     beside = origin_beside(path)
     if not beside.exists():
         return {}

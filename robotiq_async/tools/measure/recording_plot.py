@@ -122,7 +122,7 @@ class Panel(NamedTuple):
         axes = {
             name: each for name, each in curves.axes.items() if self.is_of_scissor in (None, name == SCISSOR)
         }
-        if self.what == "current":  # of a link that does not carry it there is none
+        if self.what == "current":  # some links carry no currents
             axes = {name: each for name, each in axes.items() if not np.isnan(each.current).all()}
         return axes
 

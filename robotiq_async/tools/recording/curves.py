@@ -65,7 +65,7 @@ class Event(NamedTuple):
 
 @dataclass
 class AxisCurves:
-    """The curves of one axis: a value for each of :attr:`RecordingCurves.seconds`, NaN where there is none.
+    """The curves of one axis: a value for each of :attr:`RecordingCurves.seconds`, NaN where it is not known.
 
     Attributes:
         position: counts.

@@ -194,7 +194,7 @@ class Recorder:
         """Create the file and start recording a blocking hand.
 
         Raises:
-            TypeError: the hand is one for asyncio.
+            TypeError: the hand is for asyncio.
             RecordingError: the file exists already, or cannot be created.
         """
         if self._caller is None:
@@ -225,7 +225,7 @@ class Recorder:
 
         Args:
             label: such as ``"grasp 7"``.
-            **values: such as ``object="cup"``; text, finite numbers and truth values, also numpy's. What is
+            **values: such as ``object="cup"``; text, finite numbers and truth values, also numpy's. A value
                 None is left out, as the width of an empty grasp.
 
         Raises:
@@ -315,7 +315,7 @@ class Recorder:
         error = RecordingError(f"{self.path}: {why}")
         self._failed.set_result(error)
         if self._is_open:  # the block may last for hours; at its end the error is raised
-            Log(self._hand.name).error("the recording has ended, the hand runs on: %s", error)
+            Log(self._hand.name).error("the recording has ended, the hand runs: %s", error)
 
     def _write(self, data: bytes) -> None:
         write_all(self._file.fileno(), data)

@@ -39,7 +39,7 @@ STATE: Final = "state"
 LABEL: Final = "label"
 """The column with the label of the last mark."""
 VALUES: Final = "values"
-"""The column with the values of the last mark, as JSON; empty if it has none."""
+"""The column with the values of the last mark, as JSON; empty for a mark without values."""
 
 NEARBY: Final = 100  # entries in the window for sorting
 PREFIX: Final = "/gripper/"
@@ -76,7 +76,7 @@ class Table:
         self._values = ""
 
     def row(self, kind: str, nanoseconds: int, fields: Properties) -> list[object] | None:
-        """The row of a message of this kind, with its time since 1970; None if it has none."""
+        """The row of a message of this kind, with its time since 1970; None for a message without a row."""
         if kind == "event" and "target" in fields:
             self._state = fields["target"]
         if kind == "event" and fields.get("kind") == "mark":
@@ -114,7 +114,7 @@ def _value(fields: Properties, name: str, kind: str) -> Any:  # noqa: ANN401  # 
 
 
 def _opening(fields: Properties, convention: Convention) -> float | None:
-    """The opening by a convention; None in a recording of an earlier version, which has no share."""
+    """The opening as a number of a convention; None in a recording of an earlier version, which lacks it."""
     shares = [fields[finger].get("open_fraction") for finger in ("A", "B", "C") if finger in fields]
     return None if None in shares else convention.value(sum(shares) / len(shares))
 

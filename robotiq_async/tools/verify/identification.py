@@ -45,7 +45,7 @@ async def find(bench: Bench) -> None:
 
 
 def why_no_gripper(status: RobotiqStatus) -> str:
-    """The reason why this status is not from a gripper of the model; empty if there is none."""
+    """The reason why this status is not from a gripper of the model; empty if it may be from one."""
     words = " ".join(f"{word:04X}" for word in status.registers)
     if not any(status.registers):
         return "all registers read 0; the gripper behind the fieldbus may have no power"
@@ -80,7 +80,7 @@ async def check_before_writing(bench: Bench) -> RobotiqStatus:
                 "refused", "another client commands the gripper: its requests change. Stop that client."
             )
         if any(abs(last.position(axis) - first.position(axis)) > STILL_COUNTS for axis in last.model.axes):
-            raise EndError("refused", "the fingers move: wait until they rest, and find out what moves them")
+            raise EndError("refused", "the fingers move: wait until they rest, and find the cause")
         not_ready = not_ready + 1 if last.fault is Fault.COMMUNICATION_NOT_READY else 0
     bench.link.expect(last.echo)
     _check_rest(last, not_ready)

@@ -105,7 +105,7 @@ async def stop_fingers(
             not block.
 
     Returns:
-        The status with the echo; None if there was none.
+        The status with the echo; None if no echo came.
     """
     stop = replace(image, go=False, release=False)
     has_alarmed = False

@@ -82,7 +82,7 @@ class RecordedLink:
 
     async def write_and_read(self, request: Request) -> bool:
         """Write an image with function 23, or 16 where 23 is refused; return whether 23 was answered."""
-        assert isinstance(self.link, CyclicLink), "only serial lines are asked"
+        assert isinstance(self.link, CyclicLink), "the link is a serial line"
         answer = await self._sent(request, self.link.send_and_read(lambda: request.registers))
         assert answer is not None, "there was an image to write"
         ended = asyncio.get_running_loop().time()
@@ -109,7 +109,7 @@ class RecordedLink:
         self._echoes.append((asyncio.get_running_loop().time(), echo))
 
     def expected(self) -> list[Echo]:
-        """The echoes that the gripper may have now: of the last image, and of those in the last seconds."""
+        """The echoes that the gripper may show now: the last image's, and those of the last seconds."""
         since = asyncio.get_running_loop().time() - RECENT_EXCHANGES_S
         while len(self._echoes) > 1 and self._echoes[1][0] < since:
             self._echoes.popleft()

@@ -21,13 +21,13 @@ class Report:
 
     link: str  # "tcp", "rtu", "rtu+tcp", "urcap" or "tunnel"
     model: Model = THREE_FINGER  # of the gripper
-    stages: list[int] = field(default_factory=list)  # those that have come to their end
-    entered: list[int] = field(default_factory=list)  # those that have begun
+    stages: list[int] = field(default_factory=list)  # the completed stages
+    entered: list[int] = field(default_factory=list)  # the stages that have begun
     checks: dict[str, Check] = field(default_factory=dict)  # by name
     why: str = ""  # its ending, see endings; empty while it runs
     words: str = ""  # the same in a sentence
     registers: RegisterMap | None = None  # of the gripper; None if it was not found
-    found: RobotiqStatus | None = None  # the first status; None if there was none
+    found: RobotiqStatus | None = None  # the first status; None if none came
     last: RobotiqStatus | None = None  # the newest after the fingers were stopped; None if none came
     label: str = ""  # the user's title
 
@@ -70,7 +70,7 @@ class Report:
 
     @property
     def options(self) -> dict[str, int | float]:
-        """Options of a hand that make the library right; of several values of one, the greatest."""
+        """Options of a hand that correct wrong assumptions; if one has several values, the greatest."""
         options: dict[str, int | float] = {}
         for check in self.differing:
             for name, value in check.options.items():
@@ -183,7 +183,7 @@ def _to_report(report: Report) -> str:
     names = [check.name for check in report.differing]
     if names:
         differ = "differs" if len(names) == 1 else "differ"
-        found = f"{', '.join(names)} {differ} from what the library assumes"
+        found = f"{', '.join(names)} {differ} from the library's assumption"
         return f"Please send the folder with an issue: {found}."
     if not any(report.entered):
         return "There is nothing to send yet."

@@ -1,4 +1,4 @@
-"""Goes through the stages: asks, runs, stops the fingers, and continues only if all is well."""
+"""Goes through the stages: asks for consent, runs, stops the fingers, and continues only if all is well."""
 
 # Theory of operation
 #
@@ -9,7 +9,7 @@
 #   from HARMLESS on     first the status: no other client commands, rGTO is 0 or is cleared with consent, and
 #                        the gripper is active if the stage needs it
 #
-# However a stage from HARMLESS on ends, _stop() writes rGTO = 0 until the gripper echoes it, shielded from
+# At every end of a stage from HARMLESS on, _stop() writes rGTO = 0 until the gripper echoes it, shielded from
 # Ctrl-C. Without the echo the run ends as "unstopped". The report is saved before such a stage as well: it
 # must not call the gripper usable if the program is killed.
 
@@ -35,8 +35,8 @@ from .stages.loss import report_lost_activation
 from .watch import Person, describe
 
 LEFT_SET: Final = (
-    "A program has left rGTO set. If you go on, rGTO = 0 is written first: it stops every axis, and starts "
-    "none."
+    "A program has left rGTO set. If you continue, rGTO = 0 is written first: it stops every axis, and "
+    "starts none."
 )
 
 
@@ -58,7 +58,7 @@ class Plan:
     address: Address  # the gripper; any but sim
     first: int = 0  # the stage to begin with
     last: int = LAST  # the last stage
-    agreed: int = -1  # the last stage that runs without asking; -1 for none, at most 2
+    agreed: int = -1  # the last stage that runs without a question, at most 2; -1: each stage asks
     label: str = ""  # title of the report
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
 
@@ -98,7 +98,7 @@ class Runner:
         self._bench = Bench(plan.address, person, tape.keep, plan.lengths, self.report.checks)
 
     async def run(self) -> Report:
-        """Go through the stages. Whatever happens, the fingers of a stage that moves are stopped first.
+        """Go through the stages. At every end of a stage that moves, the fingers are stopped first.
 
         Raises:
             asyncio.CancelledError: it was interrupted, as is in the report.
@@ -167,7 +167,7 @@ class Runner:
             await self._ask_to_clear_go(stage)
         if stage.needs_active and not status.is_activated:
             if self._bench.is_active:
-                report_lost_activation(self._bench, "between two stages, while no client asked")
+                report_lost_activation(self._bench, "between two stages, while no client polled")
             raise EndError("inactive", f"stage {stage.number} needs an active gripper: begin with --from 3")
         return as_found(status)
 

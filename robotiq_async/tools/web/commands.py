@@ -107,10 +107,10 @@ PAGE_COMMANDS: Final = MappingProxyType(
 
 
 class PageCommands:
-    """Carries out commands, and keeps those that run by page.
+    """Carries out commands, and keeps the running commands of each page.
 
     When a page has gone, its commands are cancelled, which holds the axes that still move. An activation, a
-    release and a reset continue, as they do whenever they are cancelled.
+    release and a reset continue, as after any cancellation.
 
     There is an operator for each hand; without any, every command is refused. ``answer`` is called with the
     outcome of each command.

@@ -144,7 +144,7 @@ class PageServer:
             ValueError: the operators do not match the hands or the settings.
         """
         if operators and [operator.hand for operator in operators] != list(hands):
-            raise ValueError("operators must be those of the hands, in their order")
+            raise ValueError("operators must belong to the hands, in their order")
         if settings.control != bool(operators):
             raise ValueError("control needs operators, and operators need control")
         self.updates: list[HandUpdates] = [HandUpdates(hand) for hand in hands]
@@ -329,7 +329,7 @@ def _patience() -> float:
 
 async def _start() -> Process:
     if is_frozen():  # it would start itself, and move the fingers a second time
-        raise ViewerError("the page needs a Python of its own, and a frozen program has none")
+        raise ViewerError("the page needs a separate Python, which a frozen program lacks")
     # This package, even if the working directory contains another of its name.
     package, here = __name__.partition(".")[0], str(Path(__file__).parents[3])
     paths = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))

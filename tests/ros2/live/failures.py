@@ -42,7 +42,7 @@ def test_a_lost_link(simulator: Simulator) -> None:
         simulator.find_link()
         status.wait(lambda it: json.loads(it.data)["connected"])
         states.wait()
-        process.prints("the link is back, and what still moved has been stopped")
+        process.prints("the link is back, and axes that still moved were stopped")
         assert client.move(0.0).ends()[0] == SUCCEEDED
         simulator.lose_link()
         status.wait(lambda it: not json.loads(it.data)["connected"])

@@ -176,7 +176,7 @@ def test_a_client_that_asks_for_the_result_while_the_node_ends(simulator: Simula
         handle = waited(accepting)
         feedback.wait(new=False)
         process.send(signal.SIGINT)
-        process.prints("results that no client has asked for yet: 1")
+        process.prints("results that no client has requested yet: 1")
         assert client.send(["fingers"], [0.0]) is None
         assert client.call("activate").message == "the node is shutting down"
         assert not client.change("shutdown")

@@ -74,7 +74,7 @@ STAGES: Final = (
         "A, then B, then C, then the scissor, each there and back; you say which one moved",
         "30 counts of 255, about an eighth of the way",
         *(_GENTLY, _WAY, "1 minute"),
-        jaw_moves="the jaw, there and back; you say what moved",
+        jaw_moves="the jaw, there and back; you say whether it moved",
     ),
     Stage(
         *(5, "stopping", stopping.stopping),

@@ -45,7 +45,7 @@ LAG_S: Final = 0.25  # seconds for which a hand ignores an object status that no
 END_COUNTS: Final = 2
 
 QUESTION: Final = (
-    "Which finger has moved, there and back? Left and right are those of the palm, seen from its front with "
+    "Which finger has moved, there and back? Left and right are the palm's, seen from its front with "
     "the single finger at the bottom."
 )
 FINGER_ANSWERS: Final = {
@@ -98,7 +98,7 @@ async def _ask_what_moved(bench: Bench, axis: Finger, before: dict[Finger, str])
         # One wrong key must not condemn a gripper.
         if not await bench.person.consents(SURE.format(axis=axis.name, answer=answers[answer])):
             raise EndError("declined", "the answer was not confirmed: begin with --from 4")
-        seen = f"commanded was {axis.name}; what moved: {answers[answer]}"
+        seen = f"commanded: {axis.name}; moved: {answers[answer]}"
         bench.differs("axis.finger", seen, "Do not use names of fingers with this gripper; report this.")
     before[axis] = answer
 
@@ -131,7 +131,7 @@ async def _one_way(watch: StageWatch, image: Request, axis: Finger, goal: int, f
     arrived = await watch.until(lambda status: _rests(status, axis, goal), STEP_S)
     if arrived is None:
         where = watch.last.position(axis) if watch.last else "?"
-        raise EndError("time", f"{axis.name} was asked to {goal} and is at {where} after {STEP_S:g} s")
+        raise EndError("time", f"{axis.name} was sent to {goal} and is at {where} after {STEP_S:g} s")
     still = await watch.until_still(2.0)
     found.errors.append(abs((still or arrived).position(axis) - goal))
 

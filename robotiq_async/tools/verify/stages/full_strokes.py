@@ -107,7 +107,7 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     share = max(abs(took / usual(speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
     if share > SPEED_SHARE:
-        words += f"; up to {100 * share:.0f} % off what is assumed"
+        words += f"; up to {100 * share:.0f} % off the assumption"
     follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
     bench.judge("stroke.time", share <= SPEED_SHARE, words, follows, **figures)
 
@@ -118,7 +118,7 @@ def _judge_openings(bench: Bench, times: dict[int, float]) -> None:
     share = max(abs(took / profile.opening_s(counts, speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
     if share > SPEED_SHARE:
-        words += f"; up to {100 * share:.0f} % off what is assumed"
+        words += f"; up to {100 * share:.0f} % off the assumption"
     follows = "No option is needed: no time limit is that short. Please report this."
     figures: dict[str, Figure] = {f"speed_{speed}_s": took for speed, took in times.items()}
     bench.judge("stroke.opening", share <= SPEED_SHARE, words, follows, **figures)

@@ -21,7 +21,7 @@ LOSS_RETRY_S: Final = 0.5
 AFTER_S: Final = 3.0
 RESETS: Final = 2
 
-GO_OR_SKIP: Final = {ENTER: "done, go on", "s": "skip this"}
+GO_OR_SKIP: Final = {ENTER: "done, continue", "s": "skip this"}
 CABLE: Final = (
     "Nothing moves now. Pull the cable of the gripper's link (not its power), wait five seconds, plug it in, "
     "and press Enter."
@@ -75,7 +75,7 @@ async def _client(bench: Bench) -> None:
     status = await watch.look()
     where = status.position(Finger.A)
     went_on = are_near(status, far, MARGIN)
-    found = f"continued to {where}" if went_on else f"stopped at {where}, asked {far[Finger.A]}"
+    found = f"continued to {where}" if went_on else f"stopped at {where}, requested {far[Finger.A]}"
     follows = "It stops when it loses its client, which is safer than assumed."
     bench.judge("loss.client", went_on, f"{bench.first} {found}", follows)
     await _first_motion(bench, watch, image, home)
@@ -192,7 +192,7 @@ async def _power(bench: Bench) -> None:
     statuses, answered = await _back(bench)
     figures: dict[str, Figure] = {"seconds": answered, "faults": _faults(statuses)}
     if statuses[-1].activation_echo or statuses[-1].go_echo:
-        follows = "Check what a hand adopts when it starts. Please report this."
+        follows = "Check the request that a hand adopts when it starts. Please report this."
         found = "rACT or rGTO is still set after the loss of power"
         bench.differs("loss.power", found, follows, **figures)
     else:

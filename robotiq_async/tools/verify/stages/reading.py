@@ -278,7 +278,7 @@ async def _silence(bench: Bench) -> None:
         follows = "A hand takes that for a fault: poll without pauses, and please report this."
         bench.differs("read.silence", lasting, follows, faults=shown)
     elif passing:
-        found = f"after {passing[0][0]} s of silence the first read shows fault 0x09, the next one does not"
+        found = f"after {passing[0][0]} s of silence the first read shows fault 0x09, the next read does not"
         follows = "No option is needed: a hand believes 0x09 only after a third read."
         bench.differs("read.silence", found, follows, faults=shown)
     else:

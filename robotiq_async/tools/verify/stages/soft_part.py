@@ -22,7 +22,7 @@ PLACE: Final = (
 )
 RELEASE: Final = "The fingers open now, and the foam falls. Keep your hands away. Enter opens them."
 AGAIN: Final = "Put the foam back as it lay. Take your hand away. Enter closes the jaw on it AT FULL SPEED."
-GO_OR_SKIP: Final = {ENTER: "done, go on", "s": "skip this"}
+GO_OR_SKIP: Final = {ENTER: "done, continue", "s": "skip this"}
 OVERRUN: Final = 10
 """Counts: one 2F-85 read a part at 91 at the slowest speed, and at 96 to 99 at full speed."""
 EARLY: Final = 2

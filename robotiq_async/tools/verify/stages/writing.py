@@ -218,7 +218,7 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
     forgotten = max(set(GAPS_S) - set(enough))
     kept_at = min((gap for gap in enough if gap > forgotten), default=None)
     found = f"a write {1000 * forgotten:.0f} ms after another is acknowledged and forgotten"
-    found += "" if kept_at is None else f", and one {1000 * kept_at:.0f} ms after it acts"
+    found += "" if kept_at is None else f", and a write {1000 * kept_at:.0f} ms later acts"
     options: Options = NO_OPTIONS
     follows = "No option is needed: a hand leaves enough time. Programs that write faster lose commands."
     if forgotten >= usual_write_spacing(bench.model):
@@ -229,7 +229,7 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
 
 
 def _marked(image: Request, number: int) -> Request:
-    """The image with another position request of finger A, by which its echo is known."""
+    """The image with another position request of finger A, which makes its echo unmistakable."""
     position = image.position(Finger.A)
     step = 1 + number % 20
     return image.with_positions({Finger.A: position - step if position > 127 else position + step})

@@ -36,7 +36,7 @@ def main() -> int:
 def _take_files() -> None:
     # A connection that has not shaken hands for https counts for no limit here, but has a file for 60 s.
     with suppress(ImportError, OSError, ValueError):
-        import resource  # noqa: PLC0415  # Windows has none
+        import resource  # noqa: PLC0415  # not on Windows
 
         _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))

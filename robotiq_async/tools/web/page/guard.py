@@ -51,7 +51,7 @@ class Guard:
         self.app = app
         self._access = access
         self._trying: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
-        """Locks by address: many attempts from one do not delay those from others."""
+        """Locks by address: many attempts from one address do not delay attempts from others."""
         self._waiting: Counter[str] = Counter()  # attempts by address
 
     async def __call__(self, scope: AsgiMessage, receive: Receive, send: AsgiSend) -> None:

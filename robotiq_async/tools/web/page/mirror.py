@@ -41,7 +41,7 @@ class CurvePoint:
 
     at: float  # monotonic seconds of this process
     positions: tuple[int, ...] | None  # in counts, of A, B, C and the scissor; None while they are unknown
-    currents: tuple[int, ...] | None  # the peaks since the sample before, in mA; None where there are none
+    currents: tuple[int, ...] | None  # the peaks since the sample before, in mA; None if not known
 
 
 @lru_cache(maxsize=64)

@@ -81,7 +81,7 @@ PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
 class PageSessions:
-    """Counts the browsers, notices when one is lost, and resends everything to one that returns."""
+    """Counts the browsers, notices a lost browser, and resends everything to a browser that returns."""
 
     def __init__(self, mirror: PageMirror) -> None:
         self._mirror = mirror
@@ -202,7 +202,7 @@ def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: P
 def _halt_button(
     name: str, halt: Callable[[], None], mirror: PageMirror, hands: Sequence[HandMirror]
 ) -> Callable[[], None]:
-    # At the foot of the window, however the page is scrolled, and above an open question.
+    # At the foot of the window, also on a scrolled page, and above an open question.
     ui.on("space", halt)
     with ui.footer().classes("p-2 rq-foot"):
         button = ui.button(name, on_click=halt, color=None).classes("w-full rq-halt")
@@ -210,7 +210,7 @@ def _halt_button(
     shown: list[str] = [name]
 
     def show() -> None:
-        # It is pressed all the same: moving axes are held once the link is back, and motion stays refused.
+        # A press still counts: moving axes are held once the link is back, and motion stays refused.
         arrives = not mirror.is_quiet and not all(hand.is_lost or hand.problem for hand in hands)
         words = name if arrives else f"{name}: does not arrive now"
         if words != shown[0]:

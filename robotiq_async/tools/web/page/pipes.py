@@ -24,7 +24,7 @@ class Pipes:
             self._out.write(json.dumps(message).encode() + b"\n")
 
     def first_line(self) -> bytes:
-        """The settings; empty if there are none."""
+        """The settings; empty if the pipe has ended."""
         return self._in.readline()
 
     def lines(self) -> Iterator[bytes]:

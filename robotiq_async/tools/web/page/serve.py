@@ -32,7 +32,7 @@ MESSAGE_MAX: Final = 65_536
 class _PageConnection(H11Protocol):
     """A connection that has to send a request soon. Strangers must not keep browsers away.
 
-    If there are too many, the oldest without a request is closed: a browser sends one at once, and gets in.
+    If there are too many, the oldest without a request is closed: a browser sends its request at once.
     """
 
     since = 0.0

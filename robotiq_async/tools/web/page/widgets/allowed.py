@@ -1,6 +1,6 @@
 """Which buttons of the page may be pressed now, and why not: a table of state, inhibit and link. Pure.
 
-What a state refuses is asked of the state machine's own table, so that a button never differs from the hand.
+The state machine's own table decides which calls a state refuses, so a button never differs from the hand.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TRIGGERS: Final = MappingProxyType(
         "release": Trigger.ASK_RELEASE,
     }
 )
-"""The trigger of each button. Recover is steps, and permit asks nothing of it."""
+"""The trigger of each button. Recover consists of several steps, and permit has no trigger."""
 HELPS: Final = MappingProxyType(
     {State.FAULT: "recover", State.ATR_DONE: "reset", State.RESET: "activate"},
 )
@@ -55,7 +55,7 @@ def why_not(name: str, hand: HandMirror, *, is_quiet: bool) -> str:
 
 
 def what_helps(hand: HandMirror, *, is_quiet: bool) -> str:
-    """The button that helps now: permit, recover, reset or activate; empty for none."""
+    """The button that helps now: permit, recover, reset or activate; empty if no button does."""
     if not is_quiet and hand.inhibited is not None:
         return "permit"
     return "" if is_quiet or hand.problem or hand.is_lost else HELPS.get(hand.state, "")

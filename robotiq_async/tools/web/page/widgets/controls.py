@@ -175,7 +175,7 @@ class Controls:
         self._asking[name]()
 
     def halt(self) -> None:
-        """Stop every axis, without a question and however old the press is. Closes open questions."""
+        """Stop every axis, without a question and also after a late press. Closes open questions."""
         for dialog in self._dialogs:
             dialog.close()
         self._ask("halt", {}, at=monotonic())
@@ -193,7 +193,7 @@ class Controls:
         def ask() -> None:
             nonlocal asked_at, confirmed
             asked_at, confirmed = monotonic(), {"confirm": True}
-            if action.name == "permit":  # of the halt that is shown, and of none that comes later
+            if action.name == "permit":  # it lifts the halt that is shown, and no later halt
                 if (seen := self._hand.inhibited) is None:
                     return
                 confirmed["seen"] = seen.as_dict()

@@ -50,7 +50,7 @@ class StatePanel:
 class Banner:
     """Calls for a person, above everything: an inhibit or a fault, and the button that helps.
 
-    ``ask`` opens the question of an action; a page that only watches has none.
+    ``ask`` opens the question of an action; a page that only watches has no questions.
     """
 
     def __init__(self, ask: Callable[[str], None] | None) -> None:
@@ -213,7 +213,7 @@ class Events:
         self._shown = -1
 
     def show(self, hand: HandMirror) -> None:
-        """Add the new events; at first also those from before the page was opened."""
+        """Add the new events; at first also the events from before the page was opened."""
         is_first, self._shown = self._shown < 0, max(self._shown, 0)
         for number, event in hand.events:
             if number > self._shown:
