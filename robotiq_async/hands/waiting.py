@@ -7,9 +7,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final, Self
 
-import anyio
-
 from ..control.state_machine import StateMachine
+from ..runtime.limit import Limit
 from ..runtime.logger import Log
 from ..values.checks import repr_of
 from ..values.enums import Severity, State
@@ -21,8 +20,8 @@ from .streams import Listeners
 
 STALLED_S: Final = 5.0
 """A gripper that waits for its activation (gFLT 0x05 to 0x07), has not begun it (gIMC = 0) or releases, and
-shows nothing new for this time, makes no progress. While it moves, its currents and positions change. No
-figure is published."""
+shows nothing new for this time while the event loop runs, makes no progress. While it moves, its currents
+and positions change. No figure is published."""
 TOLD_EVERY_S: Final = 4.0  # an activation may take half a minute on a real gripper
 ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
 _StateWaiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
@@ -103,9 +102,8 @@ class StallWatch:
     def __init__(self, listeners: Listeners, machine: StateMachine) -> None:
         self._listeners = listeners
         self._machine = machine
+        self._limit = Limit()
         self._shown: Registers | None = None
-        self._since = 0.0
-        self._scope: anyio.CancelScope | None = None
         self._remove: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Self:
@@ -114,13 +112,11 @@ class StallWatch:
 
     def __exit__(self, *_: object) -> None:
         self._remove()
+        self._limit.stop()
 
-    @contextmanager
-    def ends_early(self) -> Iterator[anyio.CancelScope]:
-        """A scope that is cancelled at a stall."""
-        with anyio.CancelScope() as self._scope:
-            yield self._scope
-        self._scope = None
+    def ends_early(self) -> Limit:
+        """A block that ends at a stall."""
+        return self._limit
 
     def _see(self, item: object) -> None:
         if not isinstance(item, RobotiqStatus):
@@ -131,9 +127,8 @@ class StallWatch:
         first, fault, *middle, last = item.registers
         shown = (first, fault & 0x0FFF, *middle, last >> 8)  # without the reserved bits
         if not waits or shown != self._shown:
-            self._shown, self._since = shown, item.timestamp
-        elif item.timestamp - self._since >= STALLED_S and self._scope is not None:
-            self._scope.cancel()
+            self._shown = shown
+            self._limit.restart(STALLED_S if waits else None)
 
 
 class ActivationProgress:

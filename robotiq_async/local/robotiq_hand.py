@@ -384,7 +384,7 @@ class RobotiqHand(Hand):
             while self.state not in RUNNING:
                 with stall.ends_early() as step:
                     await self._recover_step()
-                if step.cancelled_caught:
+                if step.is_over:
                     self._check_worth_a_reset(resets)
                     resets = await self._reset_until_shown(resets)
             self._options.log.info("recovered in %.1f s", now() - began)

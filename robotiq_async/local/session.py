@@ -329,7 +329,7 @@ class Session:
                 raise ActivationTimeoutError(str(error)) from None
             why = f"{fault.description} (gFLT 0x{int(fault):02X})"
             raise ActivationTimeoutError(f"{error}: {why}", advice="recover() resets it") from None
-        if stall.cancelled_caught:
+        if stall.is_over:
             raise self._stalled()
 
     async def next_status(self) -> None:
@@ -356,9 +356,10 @@ class Session:
     def _stalled(self) -> ActivationTimeoutError:
         assert self.controller.status is not None, "the stall was seen in one"
         fault = self.controller.status.fault
+        shown = f"nothing but {fault.description} (gFLT 0x{int(fault):02X})" if fault else "it has not begun"
         return ActivationTimeoutError(
-            f"the activation makes no progress: for {STALLED_S:g} s nothing but {fault.description} (gFLT "
-            f"0x{int(fault):02X}). Is the emergency stop released, and the gripper powered?",
+            f"the activation makes no progress: {shown} for {STALLED_S:g} s. "
+            "Is the emergency stop released, and the gripper powered?",
             advice="release it; then start(activate=False) and recover(), which resets the gripper",
         )
 

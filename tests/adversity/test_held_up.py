@@ -235,6 +235,21 @@ async def test_a_start_outlasts_a_loop_that_is_held_up(here: World, turns: int) 
     await here.hand.start()
 
 
+@inside(world)
+@pytest.mark.parametrize("turns", range(1, POLL_TURNS + 1))
+async def test_an_activation_that_has_begun_while_the_loop_was_held_up_makes_progress(
+    here: World, turns: int
+) -> None:
+    """A status from before the block, read after it, counted as 5 s without anything new."""
+    here.gripper.device_cycle = 0.2 * here.gripper.speedup
+    await here.hand.start(activate=False)
+    activating = asyncio.create_task(here.hand.activate())
+    await asyncio.sleep(0.1)
+    here.loop.after_turns(turns, lambda: here.loop.hold_up(6.0))
+    await activating
+    assert here.hand.state is State.RUNNING_IDLE
+
+
 # -- a loop that is not run, as between the prompts of IPython's terminal ---------------------------------
 
 
