@@ -18,7 +18,7 @@ SCRIPT = """
 import sys
 from robotiq_async.sync import RobotiqHand
 
-hand = RobotiqHand(sys.argv[1])
+hand = RobotiqHand(sys.argv[1], response_timeout=2.0)  # on a busy machine
 hand.start()
 hand.command(position=255, speed=0)
 for status in hand.statuses():

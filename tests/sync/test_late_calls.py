@@ -14,11 +14,14 @@ from robotiq_async.sync.loop_thread import LOOP_THREAD
 from tests.sync.conftest import Wire, adopting, in_a_thread, run_to_its_end, until
 
 PROGRAM = """
-import atexit, contextlib, gc, sys, threading, weakref
+import atexit, contextlib, functools, gc, sys, threading, weakref
 
 ADDRESS = sys.argv[1]
 {before}
 from robotiq_async.sync import RobotiqHand
+
+# The gripper is in another process, which a busy machine may keep from answering.
+RobotiqHand = functools.partial(RobotiqHand, response_timeout=2.0)
 
 class Station:
     def __init__(self, late, *, runs=True):
