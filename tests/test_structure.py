@@ -31,7 +31,7 @@ FOREIGN = {
     "values": {"member"},
 }
 """Objects of others, by the room that sets them up: of pymodbus, NiceGUI, Textual, ROS, MuJoCo, Python."""
-SIMULATED = {"gripper", "self._target.gripper", "line", "error"}
+SIMULATED = {"gripper", "self._server.gripper", "line", "error"}
 """A simulated gripper and its line, whose properties users set, too; an error that is read from the wire."""
 CONSTANTS = {"Convention"}
 """A class that has its own constants as attributes, which only exist once it does."""

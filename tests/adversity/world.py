@@ -223,7 +223,7 @@ class UrcapServer(Heard, UrcapSimulatorServer):
 
         def answer(self, frame: Frame) -> bytes:
             said = super().answer(frame)
-            self.was_spaced |= self.fault_injector.set_spacing > 0
+            self.was_spaced |= self.troubles.set_spacing > 0
             if frame.pdu.startswith(b"GET "):
                 name, value = said.decode().split()
                 if value != UNREADABLE:

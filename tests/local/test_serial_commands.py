@@ -256,7 +256,7 @@ class Refusing(SerialSimulatorServer):
 
     class _responds(RtuResponder):  # noqa: N801  # as the server names it
         def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-            return self.fault_injector.deliver(reply)
+            return self.troubles.deliver(reply)
 
 
 REFUSAL = 0x80 | BOTH

@@ -14,6 +14,7 @@ import pytest
 
 from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import (
+    FaultInjector,
     RtuOverTcpSimulatorServer,
     SerialSimulatorServer,
     SimulatorServer,
@@ -38,6 +39,12 @@ pytestmark = pytest.mark.virtual_time
 READ = bytes.fromhex("04 0000 0001")
 AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
 ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
+
+
+def test_it_shows_what_users_may_call() -> None:
+    """The server's part, which decides on requests and replies, is not theirs."""
+    shown = {name for name in dir(FaultInjector) if not name.startswith("_")}
+    assert shown == {"begin", "check", "end", "making", "ongoing", "run"}
 
 
 @asynccontextmanager

@@ -13,6 +13,7 @@ from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
 from ..troubles.like_hardware import own_habits
+from ..troubles.troubled_link import TroubledLink
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -31,7 +32,7 @@ class SimulatorEndpoint(ABC):
         gripper: the device that answers. It keeps its state when the server is stopped and started again. One
             that is not given takes 12 s for an activation.
         policy: changes, delays or drops each reply that no trouble concerns.
-        fault_injector: makes troubles happen, and decides on requests and replies.
+        fault_injector: makes troubles happen.
     """
 
     link: ClassVar[TroubleLink]
@@ -44,8 +45,9 @@ class SimulatorEndpoint(ABC):
         """``device_id`` is the only unit id that is answered; None for all."""
         self.gripper: SimulatedGripper = gripper or SimulatedGripper(habits=own_habits(THREE_FINGER))
         self.policy: ReplyPolicy = unchanged
-        self.fault_injector: FaultInjector = FaultInjector(self)
-        self._responder = self._responds(self.gripper, self.fault_injector, self.functions, device_id)
+        troubles = TroubledLink(self)
+        self.fault_injector: FaultInjector = FaultInjector(self, troubles)
+        self._responder = self._responds(self.gripper, troubles, self.functions, device_id)
         self._is_running = False
 
     async def __aenter__(self) -> Self:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from ..physics.gripper import SimulatedGripper
-    from ..troubles.fault_injector import FaultInjector
+    from ..troubles.troubled_link import TroubledLink
 
 _REQUEST_START, _STATUS_START = RTU_REGISTERS.request, RTU_REGISTERS.status
 _WRITABLE: Final = (0, _REQUEST_START)
@@ -48,7 +48,7 @@ class RegisterBank:
     FC23 writes before it reads. Where function 3 has to do for 4, it reads the status at 0x0000.
     """
 
-    def __init__(self, gripper: SimulatedGripper, troubles: FaultInjector) -> None:
+    def __init__(self, gripper: SimulatedGripper, troubles: TroubledLink) -> None:
         self._gripper = gripper
         self._troubles = troubles
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ..physics.driven_axis import PhysicsError
     from ..physics.gripper import SimulatedGripper
-    from ..troubles.fault_injector import FaultInjector
+    from ..troubles.troubled_link import TroubledLink
 
 _MOST_LEFT_OVER: Final = 100
 """Parts of replies that a multiplexer keeps for its next client."""
@@ -38,7 +38,7 @@ class Responder(ABC):
 
     Attributes:
         gripper: the device that answers.
-        fault_injector: decides on requests and replies.
+        troubles: decide on requests and replies.
         clients: the present ones, oldest first.
         failure: the error that has ended the physics of the gripper, if one has; no client is answered then.
         failed: set with it.
@@ -47,13 +47,13 @@ class Responder(ABC):
     def __init__(
         self,
         gripper: SimulatedGripper,
-        fault_injector: FaultInjector,
+        troubles: TroubledLink,
         functions: Collection[int],
         unit: int | None,
     ) -> None:
         """``unit`` is the only unit id that is answered; None for all."""
         self.gripper: Final[SimulatedGripper] = gripper
-        self.fault_injector: Final[FaultInjector] = fault_injector
+        self.troubles: Final[TroubledLink] = troubles
         self.clients: Final[list[Client]] = []
         self.failure: PhysicsError | None = None
         self.failed: Final[asyncio.Event] = asyncio.Event()
@@ -82,13 +82,13 @@ class Responder(ABC):
     def lets_in(self, client: Client) -> bool:
         """Take note of a client that has come; return whether it may stay."""
         self.clients.append(client)
-        return self.failure is None and self.fault_injector.lets_in(len(self.clients) - 1)
+        return self.failure is None and self.troubles.lets_in(len(self.clients) - 1)
 
     def forget(self, client: Client) -> None:
         """Take note that a client has gone."""
         if client in self.clients:
             self.clients.remove(client)
-            self.fault_injector.left()
+            self.troubles.left()
 
     def fail(self, error: PhysicsError) -> None:
         """Drop all clients for good: the gripper has no state any more to report."""
@@ -106,7 +106,7 @@ class Responder(ABC):
 
     def hears(self, frame: Frame) -> bool:
         """Whether a request is heard, and meant for this gripper."""
-        return self._is_meant(frame.unit) and self.fault_injector.hears()
+        return self._is_meant(frame.unit) and self.troubles.hears()
 
     @abstractmethod
     def answer(self, frame: Frame) -> bytes:
@@ -114,11 +114,11 @@ class Responder(ABC):
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; None to hang up."""
-        return self.fault_injector.deliver(reply)
+        return self.troubles.deliver(reply)
 
     def undelivered(self, part: bytes) -> None:
         """Drop bytes for a client that is gone; a multiplexer keeps them for the newest or the next."""
-        if not (self._is_open and self.fault_injector.is_multiplexed):
+        if not (self._is_open and self.troubles.is_multiplexed):
             return
         if self.clients:
             self.clients[-1].pass_on(part)
@@ -127,7 +127,7 @@ class Responder(ABC):
 
     def left_over(self) -> Iterable[bytes]:
         """Bytes that a new client gets before its first request."""
-        parts = tuple(self._left_over) if self.fault_injector.is_multiplexed else ()
+        parts = tuple(self._left_over) if self.troubles.is_multiplexed else ()
         self._left_over.clear()
         return parts
 
@@ -140,7 +140,7 @@ class ModbusResponder(Responder):
     """Answers Modbus from the registers of the gripper."""
 
     def answer(self, frame: Frame) -> bytes:
-        bank = RegisterBank(self.gripper, self.fault_injector)
+        bank = RegisterBank(self.gripper, self.troubles)
         return self._reply(frame, bank.answer(frame.pdu, self._functions))
 
     @abstractmethod

@@ -357,7 +357,7 @@ class SerialConnection(Connection):
         self._others: list[SerialConnection] = []
         """The ends of other grippers at the same place of the line."""
         self._unit = unit
-        self._line = responder.fault_injector
+        self._line = responder.troubles
         self._wire = None if reply_silence is None else WireTime(reply_silence)
         self._heard_at = 0.0
         self._sent_at = -math.inf

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from robotiq_async.values.registers import Field
 
-    from ..troubles.fault_injector import FaultInjector
     from ..troubles.trouble import TroubleLink
+    from ..troubles.troubled_link import TroubledLink
 
 UNREADABLE: Final = "?"
 """The value of a variable that the controller cannot read, as in an emergency stop (ur_rtde's client)."""
@@ -86,11 +86,11 @@ class UrcapResponder(Responder):
     def __init__(
         self,
         gripper: SimulatedGripper,
-        fault_injector: FaultInjector,
+        troubles: TroubledLink,
         functions: Collection[int],
         unit: int | None,
     ) -> None:
-        super().__init__(gripper, fault_injector, functions, unit)
+        super().__init__(gripper, troubles, functions, unit)
         self._waiting: deque[tuple[Field, int]] = deque()
         """Variables that were set and are not taken yet."""
         self._taking: asyncio.TimerHandle | None = None
@@ -139,7 +139,7 @@ class UrcapResponder(Responder):
             return f"[{self._unit or 0}]"
         if name in _ABOUT:
             return _ABOUT[name]
-        if self.fault_injector.is_unreadable:
+        if self.troubles.is_unreadable:
             return UNREADABLE
         if name in _STATUS_FIELDS:
             value = _STATUS_FIELDS[name].read(self.gripper.status_registers())
@@ -157,9 +157,9 @@ class UrcapResponder(Responder):
         except _UnknownLineError:
             return REFUSED
         changes = [(field, number) for field, number in pairs if field is not None]
-        if changes and self.fault_injector.loses_set():
+        if changes and self.troubles.loses_set():
             return ACKNOWLEDGED
-        if changes and not self._waiting and not self.fault_injector.set_spacing:
+        if changes and not self._waiting and not self.troubles.set_spacing:
             self._take(changes)
         elif changes:
             self._waiting += changes
@@ -187,7 +187,7 @@ class UrcapResponder(Responder):
     # -- one by one ------------------------------------------------------------------------------------------
 
     def _take_later(self) -> None:
-        spacing = self.fault_injector.set_spacing
+        spacing = self.troubles.set_spacing
         self._taking = asyncio.get_running_loop().call_later(spacing, self._take_next)
 
     def _take_next(self) -> None:

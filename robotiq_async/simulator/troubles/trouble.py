@@ -19,7 +19,7 @@ from typing import Final, Literal, NamedTuple, get_args
 from robotiq_async.values.checks import as_float, as_int, check_seconds
 
 from . import corruption
-from .corruption import Corruption, Parts, Reply
+from .corruption import Corruption
 
 LONGEST_TROUBLE_S: Final = 86400.0
 _MOMENT: Final = 0.0
@@ -321,14 +321,6 @@ class Trouble:
         """Whether it is about replies to writes, or to reads."""
         this: On = "write" if write else "read"
         return self.on in (this, "any") and KINDS[self.kind].on in (this, "any")
-
-    def corrupt(self, reply: Reply, amount: float) -> Parts | None:
-        """The bytes to send instead of a reply; None for a refusal, or a reply that it does not concern."""
-        # A multiplexer is late, and that is not all it does.
-        kind = KINDS["delay" if self.kind == "multiplexer" else self.kind]
-        if kind.corruption is None or reply.is_exception or not self.is_about(write=reply.is_to_a_write):
-            return None
-        return kind.corruption(reply, amount)
 
     def __str__(self) -> str:
         words = [self.kind]
