@@ -117,6 +117,19 @@ def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
         assert name not in modules
 
 
+def test_importing_values_and_units_opens_no_file_but_modules() -> None:
+    """Their figures are code, so that a program in a zip or a frozen one has them."""
+    script = """
+import sys
+opened = []
+sys.addaudithook(lambda event, said: opened.append(str(said[0])) if event == "open" else None)
+import robotiq_async.values, robotiq_async.calibration
+print(*(each for each in opened if not each.endswith((".py", ".pyc")) and "__pycache__" not in each))
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
 def test_a_maintainer_of_the_core_reads_what_the_page_says() -> None:
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     found = re.search(r"\*\*To maintain it, read\*\*(.*?)\n\n", page, re.DOTALL)

@@ -377,6 +377,7 @@ def test_the_ends_of_a_gripper_are_those_that_were_measured() -> None:
     for position, request, reached in (
         (213, 255, True),
         (211, 213, True),
+        (211, 255, True),
         (210, 255, False),
         (213, 200, False),
         (14, 0, True),
