@@ -49,7 +49,7 @@ from robotiq_async import (
 from robotiq_async.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.calibration.conventions import Convention
 from robotiq_async.calibration.csv_tables import SPEED_LAYOUT, TableError
-from robotiq_async.control.motion import Move
+from robotiq_async.control.waiters import Move
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
 from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access import AccessList

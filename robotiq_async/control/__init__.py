@@ -4,8 +4,8 @@
 #
 # Three things are known, and every decision compares them:
 #
-# * what callers have asked: changes, holds and moves (pending.py, motion.py), and one duty: a stop (stops.py)
-#   or a procedure (procedures.py);
+# * what callers have asked: changes, holds and moves (pending.py, waiters.py), and one duty: a stop
+#   (stops.py) or a procedure (procedures.py);
 # * what the gripper may have: the images written, by us or by others (ledger.py);
 # * what it shows: one of six conditions (evidence.py), and which axes rest, may press, or move where
 #   (rest.py).

@@ -29,9 +29,6 @@ class Adoption(NamedTuple):
     latest: RobotiqStatus
     now: Moment  # when that was asked for
 
-    def after(self, status: RobotiqStatus, now: Moment) -> Adoption:
-        return self._replace(latest=status, now=now)
-
     @property
     def is_certain(self) -> bool:
         """Whether the request made from the status can be relied on."""

@@ -28,15 +28,14 @@ from ..values.request import Request
 from ..values.states import RUNNING, SEEN
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, Evidence, classify, is_activating, is_interrupted
+from .evidence import FOLLOWS, Evidence, classify, is_interrupted
 from .gate import gate, merged
 from .ledger import NEVER, Ledger
-from .motion import Move
-from .pending import NONE_PENDING, Command, OpenRequests, Pending
-from .procedures import Begun, Procedure, activation, automatic_release, reset_and_activation
+from .pending import NONE_PENDING, OpenRequests, Pending, changes
+from .procedures import Procedure, activation, automatic_release, reset_and_activation
 from .state_machine import StateMachine
 from .stops import Duty, Ended, Keeping, Stop
-from .waiters import AnswerCallers, Waiter, fail
+from .waiters import AnswerCallers, Move, Waiter, fail
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
@@ -53,17 +52,11 @@ class NextWrite(NamedTuple):
     is_stop: bool  # it stops motion, as urgent ones and holds do: no caller hears of it before it leaves
 
 
-class Left(NamedTuple):
-    """For the next session of the same gripper: the writes that may still act, and the contacts."""
-
-    ledger: Ledger
-    activation: Begun | None
-
-
 class Controller:
     """State, requests and moves of one hand.
 
-    Every axis has ``speed`` and ``force``, 0..255, until set otherwise; ``machine`` is in DISCONNECTED.
+    Every axis has ``speed`` and ``force``, 0..255, until set otherwise; ``machine`` is in DISCONNECTED. The
+    ``ledger`` is for the next session of the same gripper, too: its writes may still act, and contacts last.
     """
 
     def __init__(
@@ -73,7 +66,7 @@ class Controller:
         force: int,
         write_spacing: float = 0.0,
         model: Model = THREE_FINGER,
-        left: Left | None = None,
+        before: Ledger | None = None,
         assumed: Mapping[tuple[Finger, str], int] | None = None,
         ended: AnswerCallers = fail,
     ) -> None:
@@ -82,7 +75,7 @@ class Controller:
         self.status: RobotiqStatus | None = None  # the newest; None before the first
         self.activates: bool = False  # whether a gripper that is found reset is activated
         self.foreign_commands: int = 0  # how often another client was seen to command the gripper
-        self._ledger: Final = Ledger(speed, force, model, machine.log, left and left.ledger, assumed)
+        self.ledger: Final = Ledger(speed, force, model, machine.log, before, assumed)
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
         # forget it. A stop does not wait; it is repeated.
         self._spacing: Final = write_spacing
@@ -91,7 +84,6 @@ class Controller:
         self._requests: Final = OpenRequests(machine.log, ended)
         self._duty: Stop | Procedure | None = None  # without one the pending changes are written
         self._owes_reset = False  # a stop was lost with the link while something drove the fingers
-        self._activation = left and left.activation  # stopping the hand takes it back
         self._why_no_grip = ""  # why a hand that is being stopped must not leave rGTO set
         self._warned = NEVER  # when another client was warned of
         self._free_at = NEVER  # when the spacing after the last write is over
@@ -103,15 +95,15 @@ class Controller:
     # -- what is asked ---------------------------------------------------------------------------------
     # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
 
-    def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        presses = command.position is not None or command.force is not None
+    def command(self, command: Pending, waiter: Waiter[None] | None = None) -> None:
+        presses = bool(command.positions or command.forces)
         self.machine.ask(Trigger.ASK_COMMAND, self.status, presses=presses)
         self._requests.command(command, waiter)
         self._update_state(Trigger.ASK_COMMAND)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> None:
         """Add a move as a command."""
-        self.command(Command(move.axes, move.position, speed, force))
+        self.command(changes(move.axes, move.position, speed, force))
         self._requests.add(move)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
@@ -125,7 +117,7 @@ class Controller:
             requests.merge_hold(move.axes & requests.pending.moved)
         if unseen and not is_open and self.evidence.condition is not None:
             # Axes that another client moves by now are left to it. On a new link that is found out first.
-            requests.hold_only(self._ledger.ours)
+            requests.hold_only(self.ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
         """Hold those axes that move, whichever client moves them. It ends no activation and no release."""
@@ -207,11 +199,11 @@ class Controller:
         """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN, or an activation of ours."""
         # An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
         status = self.evidence.status
-        if self._activation is not None:
+        if self.ledger.activation is not None:
             self._duty = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
             keeping = Keeping(status, self._why_no_grip, self.machine.log)
-            self._duty = keeping.see(self._ledger, status)
+            self._duty = keeping.see(self.ledger, status)
         else:
             self._duty = None if status is None else Stop(StopLevel.SHUTDOWN)
 
@@ -221,7 +213,7 @@ class Controller:
         is_stranded = self.evidence.condition is Trigger.SEEN_STRANDED
         activates = reset_and_activation if is_stranded else activation
         begin = automatic_release if trigger is Trigger.ASK_RELEASE else activates
-        self._duty = Procedure(self._ledger, begin)
+        self._duty = Procedure(self.ledger, begin)
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
@@ -237,14 +229,10 @@ class Controller:
 
     # -- what is known ---------------------------------------------------------------------------------
 
-    def left(self) -> Left:
-        """The part of the ledger that the next session of this gripper needs."""
-        return Left(self._ledger, self._activation)
-
     @property
     def speeds(self) -> dict[Finger, int]:
         """The speed of each axis, as far as it is known, once what is pending is written."""
-        base = {axis: request.speed for axis, request in self._ledger.base.by_axis}
+        base = {axis: request.speed for axis, request in self.ledger.base.by_axis}
         return {**base, **self._requests.pending.speeds}
 
     @property
@@ -255,8 +243,8 @@ class Controller:
         if self.status.is_moving or self.is_driven:
             return True
         if self.machine.state not in RUNNING:
-            return self._ledger.may_set_go
-        return bool(self._requests.pending.positions) or self._ledger.may_begin_to_move
+            return self.ledger.may_set_go
+        return bool(self._requests.pending.positions) or self.ledger.may_begin_to_move
 
     @property
     def is_driven(self) -> bool:
@@ -265,7 +253,7 @@ class Controller:
             return False
         is_busy = self.evidence.condition is Trigger.SEEN_BUSY or isinstance(self._duty, Procedure)
         shows = is_busy or status.fault is Fault.AUTOMATIC_RELEASE or is_interrupted(status)
-        return shows or self._ledger.may_drive(status)
+        return shows or self.ledger.may_drive(status)
 
     @property
     def is_busy(self) -> bool:
@@ -289,7 +277,8 @@ class Controller:
     @property
     def may_have_to_stop(self) -> bool:
         """Whether a status was read, or the last session has left something that may still act."""
-        return self.status is not None or self._activation is not None or not self._ledger.is_settled
+        ledger = self.ledger
+        return self.status is not None or ledger.activation is not None or not ledger.is_settled
 
     def _view(self) -> State:
         """The state: that of the duty; if it makes none, what the gripper shows."""
@@ -298,7 +287,7 @@ class Controller:
             return state
         if condition is None:
             return State.DISCONNECTED
-        if duty is not None and not duty.is_halt and (made := duty.state) is not None:
+        if duty is not None and (made := duty.state) is not None:
             return made
         if condition is not Trigger.SEEN_READY:
             return SEEN[condition]
@@ -313,17 +302,13 @@ class Controller:
 
     # -- what a status shows ---------------------------------------------------------------------------
 
-    def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
-        """Take in a status that was read after every acknowledgement so far."""
-        # ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
-        asked = status.timestamp if asked is None else asked
-        ledger, duty, before = self._ledger, self._duty, self.evidence.condition
+    def see(self, status: RobotiqStatus, asked: float) -> None:
+        """Take in a status that was read after every acknowledgement so far; asked for at that time."""
+        ledger, duty, before = self.ledger, self._duty, self.evidence.condition
         self.status = status
         condition = self.evidence.update(status, asked)
         ledger.update(status, asked, is_ready=condition is before is Trigger.SEEN_READY)
         # This runs at every poll, so it works out only what is waited for.
-        if self._activation is not None and self._activation.is_over(ledger, status):
-            self._activation = None
         if duty is not None:
             if isinstance(duty, Stop):
                 self._advance(duty)
@@ -344,12 +329,12 @@ class Controller:
         if condition is Trigger.SEEN_READY:
             if self._requests.moves:
                 self._requests.end_arrived(status, ledger)
-        elif condition is Trigger.SEEN_BUSY:
-            self._follow_activation(status)
+        elif condition is Trigger.SEEN_BUSY and ledger.sees_stray(status):
+            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
-        ledger, requests = self._ledger, self._requests
+        ledger, requests = self.ledger, self._requests
         # It followed requests before (None: the link was down), it does now, an entry explains its image.
         match before and before in FOLLOWS, condition in FOLLOWS, ledger.match is not None:
             case None, _, _:  # continue from our image if the gripper shows one
@@ -396,7 +381,7 @@ class Controller:
 
     def _advance(self, stop: Stop) -> None:
         """Let a stop see the newest status."""
-        ledger, judged = self._ledger, self.evidence.status
+        ledger, judged = self.ledger, self.evidence.status
         assert judged is not None
         if stop.has_activated(ledger, judged):
             self._take_back("the gripper was reset as it was stopped: its activation is taken back")
@@ -407,12 +392,6 @@ class Controller:
         elif self._duty is None and stop.level is not StopLevel.KEEP:
             self._finish(stop, judged)
 
-    def _follow_activation(self, status: RobotiqStatus) -> None:
-        if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
-            self._activation = Begun(self._ledger.last, status)
-        if self._activation is not None and self._activation.is_stray(status):
-            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
-
     def _take_back(self, why: str) -> None:
         """End an activation or a release that must not go on."""
         self.machine.log.warning("%s", why)
@@ -420,7 +399,7 @@ class Controller:
 
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
-        ledger = self._ledger
+        ledger = self.ledger
         self.foreign_commands += 1
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
@@ -433,10 +412,10 @@ class Controller:
     def _finish(self, duty: Duty, status: RobotiqStatus) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
         if duty.writes:
-            is_known = self._ledger.restart(status)
+            is_known = self.ledger.restart(status)
         else:  # it had nothing to do; WF_ shows for a moment, as DO_ leads nowhere else in the table
-            is_known = self._ledger.match is not None
-            duty.written(self._ledger.shown, status)
+            is_known = self.ledger.match is not None
+            duty.written(self.ledger.shown, status)
             self._update_state(Trigger.DELIVERED)
         self._duty = None
         # On a new link a hand that ends stops the fingers before the condition is decided.
@@ -450,14 +429,14 @@ class Controller:
     @property
     def in_flight(self) -> Entry | None:
         """The entry that is on the line: decided on, and neither acknowledged nor lost."""
-        return self._ledger.in_flight
+        return self.ledger.in_flight
 
     def next_write(self, now: float) -> NextWrite | None:
         """The next write; None if nothing is due. It changes nothing, and makes no image."""
         duty, status, pending = self._duty, self.evidence.status, self._requests.pending
         if duty is None and pending is NONE_PENDING:
             return None  # most cycles end here
-        urgent = isinstance(duty, Stop) and status is not None and duty.is_urgent(self._ledger, status)
+        urgent = isinstance(duty, Stop) and status is not None and duty.is_urgent(self.ledger, status)
         return NextWrite(self._wait(now), urgent, duty is None, urgent or bool(pending.hold))
 
     def _wait(self, now: float) -> float:
@@ -475,7 +454,7 @@ class Controller:
     def _next_of(self, duty: Stop | Procedure, status: RobotiqStatus, now: float) -> Request | None:
         if duty.activates and not duty.writes and self.evidence.may_pass:
             return None  # if the fault lasts, no activation is begun
-        image = duty.next_image(self._ledger, status)
+        image = duty.next_image(self.ledger, status)
         if isinstance(image, Ended):
             if image.why:
                 self.machine.log.warning("%s", image.why)
@@ -489,7 +468,7 @@ class Controller:
         return None
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, pending = self._ledger, self._requests.pending
+        ledger, pending = self.ledger, self._requests.pending
         if self.evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
         if self.evidence.may_pass and pending.has_changes:
@@ -519,15 +498,13 @@ class Controller:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         # ``left`` is what it has not of all that is pending.
         activates, releases = (False, False) if duty is None else (duty.activates, duty.releases)
-        may_reset = self._ledger.may_reset
+        may_reset = self.ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
         moved = NO_AXES if left.positions else self._requests.pending.moved
-        entry = self._ledger.write(image, moved, now)
+        entry = self.ledger.write(image, moved, now, activates=activates)
         self._requests.sending(entry, left)
         if duty is not None:
             duty.written(entry, status, is_early=now < self._free_at)
-        if activates:
-            self._activation = Begun(entry)
         self._free_at = now + self._spacing
         return image
 
@@ -536,7 +513,7 @@ class Controller:
         self._free_at = now + self._spacing
 
     def acknowledged(self, now: float) -> None:
-        self._ledger.acknowledge(now)
+        self.ledger.acknowledge(now)
         self._requests.acknowledged()
         self._update_state(Trigger.DELIVERED)
 
@@ -551,7 +528,7 @@ class Controller:
         if isinstance(duty, Stop) and duty.level in (StopLevel.HALT, StopLevel.RESET):
             self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
             self._owes_reset = self.is_driven
-        self._requests.lost(error, self._ledger.ahead)
+        self._requests.lost(error, self.ledger.ahead)
         self.evidence.lost()
-        self._ledger.lost(now)
+        self.ledger.lost(now)
         self._update_state(Trigger.LINK_LOST)

@@ -1,12 +1,18 @@
-"""One entry of the ledger."""
+"""One entry of the ledger, and an activation that one may have begun."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 from ..values.enums import NO_AXES, Finger
 from ..values.registers import Echo
 from ..values.request import Request
+from ..values.status import RobotiqStatus
+
+STRAY_COUNTS: Final = 10
+"""An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
+for less: 10 counts take 0.09 s [thesis]."""
 
 
 @dataclass(slots=True, eq=False)
@@ -50,3 +56,21 @@ class Entry:
     def correct(self, image: Request, echo: Echo) -> None:
         """Take in what a status has shown of it: another client's requests, or limits in place of ours."""
         self.image, self.echo = image, echo
+
+
+class Begun(NamedTuple):
+    """An activation that a write of ours has begun, or may have: stopping the hand takes it back.
+
+    A write begins one that was not asked for if another client resets the gripper just before it: then
+    its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
+    """
+
+    entry: Entry
+    first: RobotiqStatus | None = None  # the first status of one that was not asked for
+
+    def is_stray(self, status: RobotiqStatus) -> bool:
+        """Whether it was not asked for, and moves an axis."""
+        if self.first is None:
+            return False
+        pairs = ((status.position(axis), self.first.position(axis)) for axis in status.model.axes)
+        return max(abs(now - then) for now, then in pairs) > STRAY_COUNTS

@@ -38,13 +38,14 @@ from itertools import takewhile
 from typing import Final
 
 from ..runtime.logger import Log, log
-from ..values.enums import NO_AXES, Finger
+from ..values.enums import NO_AXES, Finger, Trigger
 from ..values.model import THREE_FINGER, Model
 from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
-from .entry import Entry
+from .entry import Begun, Entry
+from .evidence import classify, is_activating
 from .limits import Limits
 from .rest import Contacts, Moment, RecentRequests, drifts
 
@@ -91,6 +92,8 @@ class Ledger:
         self.requests: Final = RecentRequests(model)
         self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
+        # One that ours have begun; stopping the hand takes it back.
+        self.activation: Begun | None = None if before is None else before.activation
         self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
         self._delay = 0.0  # seconds from sending to acting, at least, of the newest write that showed
 
@@ -172,11 +175,6 @@ class Ledger:
         is_active = status.activation_echo
         return any(image.release or (image.activate and not is_active) for image in self._coming)
 
-    def may_activate(self, status: RobotiqStatus) -> bool:
-        """Whether a write of ours with rACT begins to act only in a status, or a short time before it."""
-        ours = (each for each in (*self._past, *self.ahead) if each.is_ours and each.echo == status.echo)
-        return any(each.image.activate and self._age(each) < WINDOW_S for each in ours)
-
     @property
     def may_begin_to_move(self) -> bool:
         """Whether an image that does not act yet, or does not show in gDT yet, may start an axis."""
@@ -226,7 +224,7 @@ class Ledger:
 
     # -- what is written -------------------------------------------------------------------------------
 
-    def write(self, image: Request, axes: Finger, now: float) -> Entry:
+    def write(self, image: Request, axes: Finger, now: float, *, activates: bool = False) -> Entry:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
         entry = Entry(image, image.echo, is_ours=True, sent=now)
@@ -238,6 +236,8 @@ class Ledger:
         self.requests.ask(entry, before, is_at_rest=before.image.go)
         self.ours |= axes
         self.ahead = (*self.ahead, entry)
+        if activates:
+            self.activation = Begun(entry)
         return entry
 
     def acknowledge(self, now: float) -> None:
@@ -278,7 +278,9 @@ class Ledger:
             self._delay = max(0.0, before.time - newest.sent)
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
-            self._adoption = self._adoption.after(status, self.now)
+            self._adoption = self._adoption._replace(latest=status, now=self.now)
+        if self.activation is not None and _ends_activation(status) and self.acts(self.activation.entry):
+            self.activation = None
         if is_ready and self.match is not None:
             self.update_rest(status)
 
@@ -335,6 +337,15 @@ class Ledger:
         self._past.extend([each for each in self.ahead[:count] if not each.is_doubtful])
         self.ahead = self.ahead[count:]
 
+    def sees_stray(self, status: RobotiqStatus) -> bool:
+        """Whether a status shows an activation that our rACT has begun unasked, and that moves an axis."""
+        if self.activation is None and is_activating(status):
+            # A write with rACT begins to act only in this status, or has a short time before it.
+            ours = (each for each in (*self._past, *self.ahead) if each.is_ours and each.echo == status.echo)
+            if any(each.image.activate and self._age(each) < WINDOW_S for each in ours):
+                self.activation = Begun(self.last, status)
+        return self.activation is not None and self.activation.is_stray(status)
+
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Make the image that a status shows the only certain entry; those ahead may act after it."""
         # A client that keeps writing must not make us wait again each time.
@@ -382,3 +393,8 @@ class Ledger:
             if contacts & self.requests.unrested:
                 contacts &= ~self.requests.may_move(status, self.now)
             self.contacts.see(status, contacts)
+
+
+def _ends_activation(status: RobotiqStatus) -> bool:
+    # A fault does not end it: the fingers may go on as that clears [conceivable].
+    return status.is_activated or classify(status) is Trigger.SEEN_RESET

@@ -18,21 +18,10 @@ from ..values.errors import MoveSupersededError, RobotiqError, StateTimeoutError
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .ledger import WINDOW_S, Ledger
-from .motion import Move
-from .waiters import AnswerCallers, Call, Waiter, fail, resolve
+from .waiters import AnswerCallers, Call, Move, Waiter, fail, resolve
 
 MOST_HALTS: Final = 2
 """The most times that a halt is sent. If rGTO still shows then, its callers get an error."""
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A position, a speed and a force for some axes; None changes nothing."""
-
-    axes: Finger
-    position: int | None = None
-    speed: int | None = None
-    force: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +50,22 @@ class Pending:
         """The hold of those of these axes that are not moved, for a later write."""
         return Pending(hold=self.hold & ~self.moved & axes, hold_began=self.hold_began)
 
-    def merged(self, new: Command) -> Pending:
+    def merged(self, new: Pending) -> Pending:
         # The last value wins, per axis and field; an axis keeps what a command does not name.
         return replace(
             self,
-            positions=_with(self.positions, new.axes, new.position),
-            speeds=_with(self.speeds, new.axes, new.speed),
-            forces=_with(self.forces, new.axes, new.force),
+            positions={**self.positions, **new.positions},
+            speeds={**self.speeds, **new.speeds},
+            forces={**self.forces, **new.forces},
         )
 
 
-def _with(changes: Mapping[Finger, int], axes: Finger, value: int | None) -> Mapping[Finger, int]:
-    return changes if value is None else {**changes, **dict.fromkeys(axes, value)}
+def changes(
+    axes: Finger, position: int | None = None, speed: int | None = None, force: int | None = None
+) -> Pending:
+    """A command for some axes; None changes nothing."""
+    values = [{} if value is None else dict.fromkeys(axes, value) for value in (position, speed, force)]
+    return Pending(values[0], values[1], values[2])
 
 
 NONE_PENDING: Final = Pending()
@@ -86,11 +79,10 @@ class OpenRequests:
         self.pending: Pending = NONE_PENDING  # for the next write
         self._sent = NONE_PENDING  # in the write in flight
         self.calls: list[Call] = []  # the commands, holds and halts whose callers wait
-        # By axis the move that it follows, until something else takes the axis over; the oldest move first.
-        self.moves: Final[dict[Finger, Move]] = {}
-        # The same of moves that have failed: a caller that gives up as its move fails does not see the error,
-        # and counts on a hold.
-        self._failed: Final[dict[Finger, Move]] = {}
+        self.moves: list[Move] = []  # the same of moves, in the order of their calls
+        # By axis the move that it follows, until something else takes the axis over. It may have failed: a
+        # caller that gives up as its move fails does not see the error, and counts on a hold.
+        self._followed: Final[dict[Finger, Move]] = {}
         self._log: Final = log
         self._ended: Final = ended  # gets the callers whom a request has ended
 
@@ -103,24 +95,20 @@ class OpenRequests:
     def has_undelivered_hold(self) -> bool:
         return bool(self.pending.hold or self._sent.hold)
 
-    @property
-    def _open_moves(self) -> list[Move]:
-        """The moves whose callers wait, in the order of their calls."""
-        return [*dict.fromkeys(self.moves.values())]
-
     # -- what is asked ---------------------------------------------------------------------------------
 
-    def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
+    def command(self, command: Pending, waiter: Waiter[None] | None = None) -> None:
         # Few loops at 200 Hz have a move to end.
-        if command.position is not None and (self.moves or self._failed):
-            self._take_over(command.axes, f"another command moves {command.axes}")
+        if command.positions and self._followed:
+            self._take_over(command.moved, f"another command moves {command.moved}")
         self.pending = self.pending.merged(command)
         if waiter is not None:
-            self.calls.append(Call(waiter, NO_AXES if command.position is None else command.axes))
+            self.calls.append(Call(waiter, command.moved))
 
     def add(self, move: Move) -> None:
         """Add a move whose command is pending."""
-        self.moves.update(dict.fromkeys(move.axes, move))
+        self.moves.append(move)
+        self._followed.update(dict.fromkeys(move.axes, move))
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
         """Hold those axes that move. It supersedes what moves them."""
@@ -165,19 +153,16 @@ class OpenRequests:
 
     def _take_over(self, axes: Finger, why: str, calls: Sequence[Call] = ()) -> None:
         """Let these axes follow no move; end the moves that they followed, and some other calls."""
-        moves = [move for move in self._open_moves if move.axes & axes]
+        moves = [move for move in self.moves if move.axes & axes]
         self._ended(self._close([*moves, *calls]), MoveSupersededError(why))
         for axis in axes:  # the other axes of these moves still follow them
-            self._failed.pop(axis, None)
+            self._followed.pop(axis, None)
 
     def _close(self, calls: Sequence[Call]) -> list[Waiter[Any]]:
         """These calls have ended; return their callers."""
-        if not calls:
-            return []
-        self.calls = [call for call in self.calls if call not in calls]
-        for axis, move in [*self.moves.items()]:
-            if move in calls:
-                self._failed[axis] = self.moves.pop(axis)
+        if calls:
+            self.calls = [call for call in self.calls if call not in calls]
+            self.moves = [move for move in self.moves if move not in calls]
         return [call.waiter for call in calls]
 
     # -- what becomes of it ----------------------------------------------------------------------------
@@ -189,7 +174,7 @@ class OpenRequests:
         self._sent = self.pending if has_sent else Pending(hold=self.pending.hold & ~left.hold)
         self._keep(left)
         entry.hold(self._sent.hold)
-        for call in (*self.calls, *self.moves.values()):
+        for call in (*self.calls, *self.moves):
             is_left = call.held & left.hold if call.held else keeps and not call.halts
             if call.entry is None and not is_left:
                 call.written(entry)
@@ -225,11 +210,11 @@ class OpenRequests:
 
     def leave(self, move: Move) -> tuple[bool, Finger]:
         """A move has ended, or its caller has left: whether it was open, and the axes that followed it."""
-        is_open = move in self.moves.values()
+        is_open = move in self.moves
         self._close([move])
-        axes = [axis for axis, followed in self._failed.items() if followed is move]
+        axes = [axis for axis, followed in self._followed.items() if followed is move]
         for axis in axes:
-            del self._failed[axis]
+            del self._followed[axis]
         return is_open, Finger(sum(axes))
 
     def drop(self, *, holds: bool) -> list[Waiter[Any]]:
@@ -239,9 +224,9 @@ class OpenRequests:
             The callers that wait for it.
         """
         # A write may be on the line all the same. Holds of our own making go in any case.
-        dropped = self._close([call for call in self.calls if holds or not (call.held or call.halts)])
-        dropped += self._close(self._open_moves)
-        self._failed.clear()
+        calls = [call for call in self.calls if holds or not (call.held or call.halts)]
+        dropped = self._close([*calls, *self.moves])
+        self._followed.clear()
         self.pending = Pending(hold=self.pending.hold)
         self.hold_only(NO_AXES)
         return dropped
@@ -258,10 +243,10 @@ class OpenRequests:
         hold = self.pending.hold
         for each in ahead:
             hold |= each.held
-        fail(self._close([*self.calls, *self._open_moves]), error)
+        fail(self._close([*self.calls, *self.moves]), error)
         self._keep(Pending(hold=hold))
         self._sent = NONE_PENDING
 
     @property
     def _written_moves(self) -> list[Move]:
-        return [move for move in self._open_moves if move.entry is not None]
+        return [move for move in self.moves if move.entry is not None]

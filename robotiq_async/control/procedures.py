@@ -5,28 +5,23 @@ sent is one that can show the effect. The first status decides whether the proce
 client may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller
 limits its time. It never yields its image again, even if a gripper may have forgotten it: the image moves the
 fingers. It returns why it has failed, if it has. An activation may outlast it: one that a fault has stopped
-may continue as that clears, and one whose link was lost continues. Begun is about that of the gripper.
+may continue as that clears, and one whose link was lost continues. The ledger keeps it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 from ..values.enums import Fault, Severity, State, Trigger
 from ..values.errors import GripperFaultError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .entry import Entry
 from .evidence import classify
 from .gate import at_rest
 from .ledger import WINDOW_S, Ledger
 from .stops import Duty, Ended
-
-STRAY_COUNTS: Final = 10
-"""An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
-for less: 10 counts take 0.09 s [thesis]."""
 
 RESET_S: Final = 5.0
 """Time for a stranded gripper to show a reset: as long as reset() waits for one."""
@@ -39,17 +34,12 @@ class Procedure(Duty):
     """An activation or an automatic release. If it has no image to send, what shows counts as its write."""
 
     def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:
-        super().__init__()
         self.releases = begin is automatic_release
         self.activates = not self.releases
+        release, activation = (State.DO_ATR, State.WF_ATR), (State.DO_ACTIVATION, State.WF_ACTIVATION)
+        super().__init__(release if self.releases else activation)
         self._steps: Final = begin(lambda status: at_rest(ledger.base, status))
         next(self._steps)  # to its first yield: what the gripper shows decides whether it begins
-
-    @property
-    def state(self) -> State:
-        if self.is_delivered:
-            return State.WF_ATR if self.releases else State.WF_ACTIVATION
-        return State.DO_ATR if self.releases else State.DO_ACTIVATION
 
     def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
         """The image to write now; None if it waits."""
@@ -59,30 +49,6 @@ class Procedure(Duty):
             return self._steps.send(status)
         except StopIteration as end:
             return Ended(end.value)
-
-
-class Begun(NamedTuple):
-    """An activation that a write of ours has begun, or may have: stopping the hand takes it back.
-
-    A write begins one that was not asked for if another client resets the gripper just before it: then
-    its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
-    """
-
-    entry: Entry
-    first: RobotiqStatus | None = None  # the first status of one that was not asked for
-
-    def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        """Whether a status shows its end. What shows may be from before it."""
-        # A fault does not end it: the fingers may go on as that clears [conceivable].
-        has_ended = status.is_activated or classify(status) is Trigger.SEEN_RESET
-        return has_ended and ledger.acts(self.entry)
-
-    def is_stray(self, status: RobotiqStatus) -> bool:
-        """Whether it was not asked for, and moves an axis."""
-        if self.first is None:
-            return False
-        pairs = ((status.position(axis), self.first.position(axis)) for axis in status.model.axes)
-        return max(abs(now - then) for now, then in pairs) > STRAY_COUNTS
 
 
 def activation(image: Image) -> Steps:

@@ -32,7 +32,7 @@ from ..values.enums import Fault, Finger, State, StopLevel, Trigger
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, classify, is_activating
+from .evidence import classify, is_activating
 from .gate import at_rest
 from .ledger import Ledger
 from .pending import MOST_HALTS
@@ -65,8 +65,14 @@ class Duty:
     activates = releases = False  # whether its images may raise rACT, and rATR
     is_halt = False  # in all others a status counts for the duty alone
 
-    def __init__(self) -> None:
+    def __init__(self, states: tuple[State, State] | None = None) -> None:
         self.writes: Final[list[Write]] = []
+        self._states: Final = states
+
+    @property
+    def state(self) -> State | None:
+        """The state of the hand that it makes; None if that is what the gripper shows."""
+        return None if self._states is None else self._states[self.is_delivered]
 
     @property
     def is_delivered(self) -> bool:
@@ -81,16 +87,9 @@ class Stop(Duty):
     """One stop, until it is reached. A new level is a new stop; so is the same one, to be written again."""
 
     def __init__(self, level: StopLevel) -> None:
-        super().__init__()
+        super().__init__((State.DO_RESET, State.WF_RESET) if level is StopLevel.RESET else None)
         self.level: Final = level
         self.is_halt = level is StopLevel.HALT
-
-    @property
-    def state(self) -> State | None:
-        """The state of the hand that it makes; None if that is what the gripper shows."""
-        if self.level is not StopLevel.RESET:
-            return None
-        return State.WF_RESET if self.is_delivered else State.DO_RESET
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its first write leaves before the next read."""
@@ -98,12 +97,9 @@ class Stop(Duty):
 
     def has_cause(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether there is anything to stop."""
-        match self.level:
-            case StopLevel.RESET:
-                return True
-            case StopLevel.HALT:
-                return classify(status) in FOLLOWS
-        return status.go_echo or not ledger.is_settled  # what does not act yet may set rGTO, or activate
+        # The hand ends: what does not act yet may set rGTO, or activate.
+        is_asked = self.level in (StopLevel.HALT, StopLevel.RESET)
+        return is_asked or status.go_echo or not ledger.is_settled
 
     def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
         """The image to write now: the first if there is anything to stop, or the last if it is due again."""
@@ -112,8 +108,6 @@ class Stop(Duty):
         if not self.writes:
             return Ended() if self.level is StopLevel.SHUTDOWN else None
         entry, is_early, _ = self.writes[-1]
-        if entry.acknowledged is None:
-            return None
         # An early one whatever shows: the gripper may yet forget it [manual 2014, p. 75].
         return entry.image if is_early or (self._rules(status)[0] and ledger.acts(entry)) else None
 
@@ -146,7 +140,7 @@ class Stop(Duty):
 
     def see(self, ledger: Ledger, status: RobotiqStatus) -> Stop | None:
         """Take in a status; return the stop from then on, or None once this one is over."""
-        if not self.writes or self.writes[-1].is_early or self.writes[-1].entry.acknowledged is None:
+        if not self.writes or self.writes[-1].is_early:
             return self
         if self.is_halt and not status.go_echo and not ledger.may_set_go:
             return None  # then it need not act
@@ -185,7 +179,7 @@ class Keeping(Stop):
         ledger.update_rest(status)
         why = self._why_no_grip
         if not self.writes or ledger.acts(self.writes[-1].entry):  # if not, a hold will overwrite what shows
-            why = why or self._trouble(ledger, status) or self._why_not_at_rest(ledger, status)
+            why = why or self._doubt(ledger, status)
             self._since = min(self._since, ledger.now.time) if self._rests(ledger, status) else math.inf
         if why:
             stop = Stop(StopLevel.SHUTDOWN)
@@ -213,14 +207,14 @@ class Keeping(Stop):
         held = base.with_positions(ledger.held(Finger.ALL, status))
         return None if held == base else held
 
-    def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:
-        # Any fault, also a minor one: no hand would be there to see it clear.
+    def _doubt(self, ledger: Ledger, status: RobotiqStatus) -> str:
+        """Why no grip can be kept; empty as long as one may."""
         condition = classify(status)
+        # Any fault, also a minor one: no hand would be there to see it clear.
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
             return f"the {condition.value} ({status.fault.description})"
-        return "another client commands the gripper" if ledger.match is None else ""
-
-    def _why_not_at_rest(self, ledger: Ledger, status: RobotiqStatus) -> str:
+        if ledger.match is None:
+            return "another client commands the gripper"
         if status.timestamp - ledger.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
         # A late object status is worth a wait. A write in doubt is not.

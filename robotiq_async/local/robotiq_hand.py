@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from ..calibration import ForceCalibration, SpeedCalibration
-from ..control.pending import Command
+from ..control.pending import changes
 from ..control.state_machine import StateMachine
 from ..hands.base import Hand
 from ..hands.options import (
@@ -232,12 +232,12 @@ class RobotiqHand(Hand):
     # -- commands --------------------------------------------------------------------------------------
 
     async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
-        session, command = self._admitted(), Command(axes, **{what: value})
+        session, command = self._admitted(), changes(axes, **{what: value})
         await session.answered(lambda waiter: session.controller.command(command, waiter))
 
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
         session = self._admitted()
-        session.ask(session.controller.command, Command(axes, position, speed, force))
+        session.ask(session.controller.command, changes(axes, position, speed, force))
 
     async def _move(
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None

@@ -22,10 +22,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, ClassVar, Final, ParamSpec, TypeVar
 
-from ..control.controller import Controller, Left
-from ..control.motion import Move
+from ..control.controller import Controller
+from ..control.ledger import Ledger
 from ..control.state_machine import StateMachine
-from ..control.waiters import Waiter
+from ..control.waiters import Move, Waiter
 from ..hands.options import HandOptions
 from ..hands.statistics import Counters
 from ..hands.streams import Channels
@@ -93,7 +93,7 @@ class Session:
         InvalidStateError: another hand of this process owns the gripper.
     """
 
-    _claims: ClassVar[Claims[Session, Left]] = Claims()
+    _claims: ClassVar[Claims[Session, Ledger]] = Claims()
 
     def __init__(
         self,
@@ -161,8 +161,8 @@ class Session:
             if self._task.done():  # not if a second Ctrl-C has broken the event loop
                 self._end_with(self._task)
 
-    def _claim(self) -> Left | None:
-        """Claim the gripper; return the writes of its last run that may still act."""
+    def _claim(self) -> Ledger | None:
+        """Claim the gripper; return the ledger of its last run, whose writes may still act."""
         gripper = self.options.link.gripper
         owner = self._claims.claim(gripper, self, lambda each: each.is_over)
         if owner is not None:
@@ -183,7 +183,7 @@ class Session:
         """The run is over: no caller may wait for it."""
         run = self.run
         # Before SHUTDOWN is published: a reader of it may start a hand.
-        self._claims.release(self, self.controller.left())
+        self._claims.release(self, self.controller.ledger)
         self.controller.close()
         self._publisher.tell()
         self._waiters.fail(run.why_over)

@@ -8,10 +8,9 @@ from typing import Any
 
 from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.control.controller import Controller
-from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.control.waiters import Waiter, fail
+from robotiq_async.control.waiters import Move, Waiter, fail
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import StopLevel, Trigger
 from robotiq_async.values.errors import RobotiqError
@@ -116,7 +115,7 @@ class Scan:
             64,
             spacing,
             model,
-            after.controller.left() if after is not None and goes_on else None,
+            after.controller.ledger if after is not None and goes_on else None,
             ended=self._ended.add,
         )
         self.written: list[Registers] = []
@@ -151,12 +150,15 @@ class Scan:
             registers = with_object_status(registers, self._late[0][1])
         return RobotiqStatus(registers, now, self.polls, self.gripper.model)
 
+    def see(self) -> None:
+        self.controller.see(self.status(), self.now)
+
     def connect(self, *, activate: bool = True) -> None:
         self.controller.activates = activate
-        self.controller.see(self.status())
+        self.see()
         while self.controller.evidence.is_undecided:
             self.now += POLL_S
-            self.controller.see(self.status())
+            self.see()
         self.controller.activates = False
 
     def step(
@@ -167,7 +169,7 @@ class Scan:
         ``arrives`` and ``lost`` are the seconds from the write to that.
         """
         self.now += poll
-        self.controller.see(self.status())
+        self.see()
         self._write(answer=answer, arrives=arrives, lost=lost)
         self.answer_ended()
 
@@ -277,7 +279,7 @@ class Scan:
         force: int | None = None,
     ) -> Outcome:
         outcome = Outcome()
-        self.controller.command(Command(axes, position, speed, force), outcome)
+        self.controller.command(changes(axes, position, speed, force), outcome)
         self.answer_ended()
         return outcome
 

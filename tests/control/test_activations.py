@@ -78,7 +78,7 @@ def test_a_stop_after_a_lost_link_writes_what_the_gripper_has() -> None:
     scan.controller.lost(None)
     scan.now += 1
     scan.controller.refuse_requests()
-    scan.controller.see(scan.status())
+    scan.see()
     scan.controller.stop_fingers()
     scan.step()
     assert [request.position for request in scan.last_image.axes[:3]] == [200, 200, 200]
@@ -124,7 +124,7 @@ def test_a_sequence_begun_while_a_write_is_on_the_line(scan: Scan, what: str) ->
     scan.gripper.write(0, request.registers)
     scan.controller.acknowledged(scan.now)
     assert scan.state in (State.DO_RESET, State.DO_ATR), "its own request has not been sent yet"
-    scan.controller.see(scan.status())
+    scan.see()
     scan.until(lambda: scan.state in (State.RESET, State.ATR_DONE))
 
 

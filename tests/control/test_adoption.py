@@ -40,8 +40,8 @@ class Seen:
         self.adoption = Adoption(now, first, first, now)
 
     def see(self, status: RobotiqStatus, now: Moment | None = None) -> None:
-        reads = self.adoption.now.reads + 1
-        self.adoption = self.adoption.after(status, now or Moment(status.timestamp, reads))
+        now = now or Moment(status.timestamp, self.adoption.now.reads + 1)
+        self.adoption = self.adoption._replace(latest=status, now=now)
 
     @property
     def is_certain(self) -> bool:

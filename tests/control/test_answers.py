@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import ConnectionLostError, Fault, Finger, GripperFaultError, MoveSupersededError, State
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.values.model import THREE_FINGER
 from tests.control.scan import POLL_S, Scan, started
 
@@ -125,7 +125,7 @@ def test_a_command_on_the_line_is_delivered_although_a_hold_follows_it() -> None
 
 def test_the_state_tells_of_a_command_until_it_is_delivered_whether_a_caller_waits_or_not() -> None:
     scan = started()
-    scan.controller.command(Command(A, 100))
+    scan.controller.command(changes(A, 100))
     assert scan.decide() is not None
     scan.controller.drop_requests(MoveSupersededError("its client is gone"))
     assert scan.state is State.RUNNING_CC
@@ -139,7 +139,7 @@ def test_a_command_that_is_dropped_while_a_hold_is_on_the_line_leaves_no_trace()
     scan.run(0.5)
     scan.controller.abandon(move)
     assert scan.decide() is not None
-    scan.controller.command(Command(A, 100))
+    scan.controller.command(changes(A, 100))
     assert scan.state is State.RUNNING_CC
     scan.controller.drop_requests(MoveSupersededError("its client is gone"))
     assert scan.state is State.RUNNING_IDLE, "the hold is of our own making"

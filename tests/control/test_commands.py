@@ -6,8 +6,8 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotActivatedError
 from robotiq_async.calibration.scales import closing_time
-from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
+from robotiq_async.control.waiters import Move
 from robotiq_async.local.session import usual_time
 from tests.control.other_client import going_to
 from tests.control.scan import Outcome, Scan
@@ -63,7 +63,7 @@ def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_pol
 
 def test_the_default_timeout_goes_by_the_speed_an_axis_has_or_is_about_to_get(scan: Scan) -> None:
     usual = default_timeout(scan, 241, A)
-    scan.controller.command(Command(A, None, 0))
+    scan.controller.command(changes(A, None, 0))
     slow = default_timeout(scan, 241, A)
     assert slow > usual
     scan.hold()

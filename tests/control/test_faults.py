@@ -228,7 +228,7 @@ def test_stops_pending_in_fault_are_not_written_once_the_activation_is_lost(scan
     halted = scan.halt()
     writes = len(scan.written)
     scan.gripper.power_cycle()
-    scan.controller.see(scan.status())
+    scan.see()
     assert isinstance(halted.error, NotActivatedError)
     scan.run(0.5)
     assert scan.state is State.RESET

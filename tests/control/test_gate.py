@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.gate import gate
-from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.control.waiters import Move
 from robotiq_async.values.enums import StopLevel
 from robotiq_async.values.model import MODELS, Model
 from robotiq_async.values.request import Request
@@ -43,7 +43,7 @@ def test_an_activation_raises_ract_and_a_release_ratr() -> None:
 
 
 CALLS: dict[str, Callable[[Controller, int], object]] = {
-    "command": lambda hand, value: hand.command(Command(Finger.A, value, value, value), Outcome()),
+    "command": lambda hand, value: hand.command(changes(Finger.A, value, value, value), Outcome()),
     "move": lambda hand, value: hand.move(Move(value, Finger.A, 0.0, Outcome()), value, None),
     "hold": lambda hand, _: hand.hold(Finger.A, Outcome()),
     "halt": lambda hand, _: hand.halt(Outcome()),
@@ -72,7 +72,7 @@ def test_whatever_is_asked_and_shown_ract_rises_and_ratr_is_set_only_where_it_wa
     hand.activates = activates
     for number, (call, value, registers, is_answered) in enumerate(life):
         now = 100 + number * POLL_S
-        hand.see(RobotiqStatus((*registers, 0, 0, 0, 0), now, number, model))
+        hand.see(RobotiqStatus((*registers, 0, 0, 0, 0), now, number, model), now)
         if call:
             with contextlib.suppress(RobotiqError):
                 CALLS[call](hand, value)

@@ -185,7 +185,7 @@ def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
     scan = moved_by_another()
     halted = scan.halt()
     scan.gripper.inject_fault(Fault(0x0C), 0.1)
-    scan.controller.see(scan.status())
+    scan.see()
     assert scan.state is State.FAULT
     at = scan.positions()[A]
     scan.run(10)

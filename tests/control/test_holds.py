@@ -190,7 +190,7 @@ def test_a_hold_ends_in_a_fault(scan: Scan, when: str) -> None:
     scan.run(0.5)
     asked = scan.hold(A) if when == "before" else None
     scan.gripper.inject_fault(Fault(0x0C), 1.0)
-    scan.controller.see(scan.status())
+    scan.see()
     assert scan.state is State.FAULT
     asked = asked or scan.hold(A)
     scan.until(lambda: asked.is_answered, 0.6)

@@ -225,7 +225,7 @@ def test_another_client_seen_between_the_call_and_the_stop_is_a_doubt(
     scan = holding()
     scan.controller.refuse_requests()
     other_client(scan)
-    scan.controller.see(scan.status())
+    scan.see()
     scan.controller.stop_fingers(StopLevel.KEEP)
     scan.until(lambda: not scan.controller.is_busy, 1.0)
     assert not scan.status().go_echo
@@ -238,7 +238,7 @@ def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan.controller.stop_fingers(StopLevel.KEEP)
     scan.step()
     scan.controller.lost(None)
-    scan.controller.see(scan.status())
+    scan.see()
     scan.controller.stop_fingers(StopLevel.KEEP)
     scan.until(lambda: not scan.controller.is_busy, 1.0)
     assert not scan.gripper.grips

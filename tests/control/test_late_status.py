@@ -457,7 +457,7 @@ def test_nothing_is_known_under_what_does_not_act() -> None:
 
 def asked_of(scan: Scan, axis: Finger) -> int:
     """The number of requests of an axis that a status may be from."""
-    return len(scan.controller._ledger.requests.targets[axis])
+    return len(scan.controller.ledger.requests.targets[axis])
 
 
 @LAGS

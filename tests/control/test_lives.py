@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Finger, Inhibit, State
 from robotiq_async.control.ledger import WINDOW_S
-from robotiq_async.control.motion import Move
+from robotiq_async.control.waiters import Move
 from robotiq_async.values.enums import NO_AXES, Trigger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE

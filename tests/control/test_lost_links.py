@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqStatus, State
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.other_client import activated_by_another, going_to, image
 from tests.control.scan import POLL_S, Scan, started
@@ -101,7 +101,8 @@ def test_a_move_that_is_given_up_only_once_the_link_is_back_is_held_even_after_a
     assert isinstance(outcome.error, ConnectionLostError)
     status = scan.status()
     gimc_2 = (status.registers[0] & ~0x3000) | 0x2000
-    scan.controller.see(RobotiqStatus((gimc_2, *status.registers[1:]), scan.now, scan.polls, status.model))
+    changing = RobotiqStatus((gimc_2, *status.registers[1:]), scan.now, scan.polls, status.model)
+    scan.controller.see(changing, scan.now)
     assert scan.state is State.WF_ACTIVATION
     scan.controller.abandon(move, unseen=True)
     at = scan.gripper.position(A)
@@ -193,7 +194,7 @@ def test_a_command_after_a_lost_acknowledgement_waits_until_it_is_known_what_act
 
 def test_a_lost_command_does_not_come_back_when_the_gripper_was_busy_at_the_reconnect(scan: Scan) -> None:
     scan.moved(50)
-    scan.controller.command(Command(A, 250))
+    scan.controller.command(changes(A, 250))
     scan.now += POLL_S
     assert scan.controller.decide(scan.now) is not None  # it never arrives
     scan.controller.lost(None)
@@ -327,7 +328,7 @@ def test_a_lost_hold_is_dropped_when_the_gripper_comes_back_reset(scan: Scan) ->
     assert scan.controller.has_open_stop
     scan.gripper.write(0, [0x0000])
     scan.now += 0.5
-    scan.controller.see(scan.status())
+    scan.see()
     assert scan.state is State.RESET
     assert not scan.controller.has_open_stop
 

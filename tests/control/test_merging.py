@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.gate import merged
-from robotiq_async.control.pending import Command, Pending
+from robotiq_async.control.pending import Pending, changes
 from robotiq_async.control.rest import agrees, drifts
 from robotiq_async.values.enums import NO_AXES, Finger, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
@@ -51,7 +51,7 @@ def places(base: Request, pending: Pending, status: RobotiqStatus, may_move: Fin
 def command(
     axes: Finger, position: int | None = None, speed: int | None = None, force: int | None = None
 ) -> Pending:
-    return Pending().merged(Command(axes, position, speed, force))
+    return Pending().merged(changes(axes, position, speed, force))
 
 
 def hold(axes: Finger) -> Pending:
@@ -114,7 +114,7 @@ def test_axes_not_addressed_stay_or_keep_their_requests(
 
 
 def test_an_axis_may_be_held_while_another_is_sent_somewhere() -> None:
-    pending = hold(A | B).merged(Command(B, 200))
+    pending = hold(A | B).merged(changes(B, 200))
     assert positions(after(GOING, pending)) == (101, 200, 30, 40)
 
 
@@ -146,7 +146,7 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
 ) -> None:
     pending = Pending(hold=held)
     for each in commands:
-        pending = pending.merged(Command(*each))
+        pending = pending.merged(changes(*each))
     stopped = places(base, pending, status, may_move)
     image = merged(base, pending, status, gripping=gripping, held=stopped)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)

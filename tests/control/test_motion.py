@@ -8,9 +8,8 @@ import pytest
 
 from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
-from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command, OpenRequests, Pending
-from robotiq_async.control.waiters import fail
+from robotiq_async.control.pending import OpenRequests, Pending, changes
+from robotiq_async.control.waiters import Move, fail
 from robotiq_async.values.enums import NO_AXES, Finger, ObjectStatus
 from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
@@ -95,7 +94,7 @@ def test_it_is_known_which_axes_still_follow_a_move() -> None:
     moves = live(failed)
     moves.supersede(A, "A")
     ENDED.answer()
-    moves.command(Command(B, 0))
+    moves.command(changes(B, 0))
     assert moves.leave(failed) == (False, C)
     moves = live(arrived)
     write(moves)
@@ -174,7 +173,7 @@ def live(*each: Move) -> OpenRequests:
 
 
 def ask(moves: OpenRequests, move: Move) -> None:
-    moves.command(Command(move.axes, move.position))
+    moves.command(changes(move.axes, move.position))
     moves.add(move)
 
 
@@ -233,7 +232,7 @@ def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     assert one.is_answered
     assert other.is_answered
     assert not goes_on.answers
-    assert moves.moves == {C: third}
+    assert moves.moves == [third]
 
 
 def test_an_error_fails_its_moves_and_the_others_go_on() -> None:

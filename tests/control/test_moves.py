@@ -6,7 +6,7 @@ import pytest
 
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
 from robotiq_async.calibration.scales import closing_time
-from robotiq_async.control.motion import Move
+from robotiq_async.control.waiters import Move
 from robotiq_async.local.session import usual_time
 from robotiq_async.values.request import Request
 from tests.control.scan import POLL_S, Outcome, Scan, started

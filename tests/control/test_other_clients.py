@@ -212,7 +212,7 @@ def test_a_pending_hold_does_not_stop_a_client_that_took_over(scan: Scan) -> Non
     scan.gripper.write(0, image.with_positions({A: 90}).registers)
     scan.now += 0.02
     scan.controller.abandon(move)
-    scan.controller.see(scan.status())
+    scan.see()
     assert scan.controller.foreign_commands == 1
     scan.run(10)
     assert scan.positions()[A] == 90

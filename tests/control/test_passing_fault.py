@@ -57,7 +57,7 @@ def test_a_start_looks_past_it_and_adopts() -> None:
 def test_it_decides_nothing_about_a_gripper_before_it_has_looked_past_it() -> None:
     scan = quiet()
     scan.controller.activates = True
-    scan.controller.see(scan.status())
+    scan.see()
     assert scan.controller.evidence.is_undecided
     assert scan.state is State.DISCONNECTED
     assert scan.controller.decide(scan.now) is None
@@ -91,7 +91,7 @@ def test_on_a_link_so_slow_that_each_read_ends_a_silence_things_are_done() -> No
     for _ in range(LASTS_READS):
         assert scan.state is State.DISCONNECTED
         scan.now += 1.2
-        scan.controller.see(scan.status())
+        scan.see()
     assert scan.state is State.RUNNING_IDLE
     outcome = scan.command(A, position=100)
     scan.now += 1.2

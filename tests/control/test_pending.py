@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.ledger import Ledger
-from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import NONE_PENDING, Command, OpenRequests, Pending
-from robotiq_async.control.waiters import fail
+from robotiq_async.control.pending import NONE_PENDING, OpenRequests, Pending, changes
+from robotiq_async.control.waiters import Move, fail
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
@@ -40,7 +39,7 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 ) -> None:
     pending = Pending()
     for axes, position, speed, force in commands:
-        pending = pending.merged(Command(axes, position, speed, force))
+        pending = pending.merged(changes(axes, position, speed, force))
     for field, merged in enumerate((pending.positions, pending.speeds, pending.forces)):
         for axis in THREE_FINGER.axes:
             values = [
@@ -57,7 +56,7 @@ Step = Callable[[OpenRequests], None]
 
 def command(axes: Finger, position: int | None = None, setting: int | None = None) -> Step:
     """A command with the same setting for speed and force."""
-    return lambda requests: requests.command(Command(axes, position, setting, setting))
+    return lambda requests: requests.command(changes(axes, position, setting, setting))
 
 
 def hold(axes: Finger) -> Step:
@@ -96,9 +95,9 @@ def test_holds_and_halts_drop_positions_and_nothing_else(
 def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
     ended = Ended()
     requests, held, other, setting = OpenRequests(ended=ended.add), Outcome(), Outcome(), Outcome()
-    requests.command(Command(A, 100), held)
-    requests.command(Command(B, 100), other)
-    requests.command(Command(A, None, 50), setting)
+    requests.command(changes(A, 100), held)
+    requests.command(changes(B, 100), other)
+    requests.command(changes(A, None, 50), setting)
     hold(A)(requests)
     assert not held.answers, "they hear after the write"
     ended.answer()
@@ -113,8 +112,8 @@ def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
         (lambda _: None, True, False),
         (hold(A), False, False),
         (command(A, 1), False, True),
-        (lambda requests: requests.command(Command(A, None, 1)), False, True),
-        (lambda requests: requests.command(Command(A, None, None, 1)), False, True),
+        (lambda requests: requests.command(changes(A, None, 1)), False, True),
+        (lambda requests: requests.command(changes(A, None, None, 1)), False, True),
     ],
     ids=["nothing", "hold", "position", "speed", "force"],
 )
@@ -131,14 +130,14 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
 
 
 def waiting(requests: OpenRequests) -> list[object]:
-    return [call.waiter for call in (*requests.calls, *dict.fromkeys(requests.moves.values()))]
+    return [call.waiter for call in (*requests.calls, *requests.moves)]
 
 
 def test_a_halt_drops_positions_and_leaves_pending_speeds() -> None:
     """The speed stays pending and is delivered: its caller must not hear MoveSupersededError."""
     requests, for_speed, for_position = OpenRequests(), Outcome(), Outcome()
-    requests.command(Command(A, None, 50), for_speed)
-    requests.command(Command(B, 100), for_position)
+    requests.command(changes(A, None, 50), for_speed)
+    requests.command(changes(B, 100), for_position)
     halt(requests)
     assert requests.pending.speeds == {A: 50}
     assert isinstance(for_position.error, MoveSupersededError)
@@ -149,7 +148,7 @@ def test_a_halt_drops_positions_and_leaves_pending_speeds() -> None:
 def test_a_position_goes_before_a_hold_whose_caller_still_waits() -> None:
     requests, holder = OpenRequests(), Outcome()
     requests.hold(A, "hold", holder)
-    requests.command(Command(A, 100))
+    requests.command(changes(A, 100))
     assert waiting(requests) == [holder]
     assert not holder.is_answered
 
@@ -174,7 +173,7 @@ def test_moves_that_end_together_are_answered_in_the_order_of_their_calls() -> N
 
     callers = [Noted(), Noted(), Noted()]
     for axes, caller in zip((C, A, B), callers, strict=True):
-        requests.command(Command(axes, 100))
+        requests.command(changes(axes, 100))
         requests.add(Move(100, axes, 0.0, caller))
     hold(Finger.ALL)(requests)
     assert answered == callers
@@ -182,7 +181,7 @@ def test_moves_that_end_together_are_answered_in_the_order_of_their_calls() -> N
 
 def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
     requests, mover, holder = OpenRequests(), Outcome(), Outcome()
-    requests.command(Command(A, 100, 50), mover)
+    requests.command(changes(A, 100, 50), mover)
     requests.hold(B, "hold", holder)
     requests.hold(C, "hold")
     fail(requests.drop(holds=False), LOST)
@@ -196,7 +195,7 @@ def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
 def test_a_halt_takes_the_holds_with_it() -> None:
     """The hold alone would leave nothing to write, and its caller would wait for ever."""
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
-    requests.command(Command(B, None, 50), setter)
+    requests.command(changes(B, None, 50), setter)
     requests.hold(A, "hold", holder)
     requests.sending(Ledger(128, 64).last, replace(requests.pending, hold=NONE))
     assert requests.pending == Pending(speeds={B: 50})
@@ -206,7 +205,7 @@ def test_a_halt_takes_the_holds_with_it() -> None:
 
 def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
-    requests.command(Command(B, None, 50), setter)
+    requests.command(changes(B, None, 50), setter)
     requests.hold(A, "hold", holder)
     requests.sending(Ledger(128, 64).last, requests.pending)
     requests.acknowledged()
@@ -216,8 +215,8 @@ def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
 
 def test_a_failure_gives_every_caller_an_error_of_its_own() -> None:
     requests, callers = OpenRequests(), [Outcome(), Outcome()]
-    requests.command(Command(A, 100), callers[0])
-    requests.command(Command(A, None, 50), callers[1])
+    requests.command(changes(A, 100), callers[0])
+    requests.command(changes(A, None, 50), callers[1])
     fail(requests.drop(holds=True), LOST)
     errors = [each.answers[0] for each in callers]
     assert all(isinstance(error, ConnectionLostError) for error in errors)

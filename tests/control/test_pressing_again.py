@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import Fault, Finger, ObjectStatus
-from robotiq_async.control.motion import Move
+from robotiq_async.control.waiters import Move
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values import registers as reg
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, Model

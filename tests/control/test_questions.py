@@ -48,7 +48,7 @@ class Hand:
 
     def live(self, call: str, value: int, status: RobotiqStatus, *, is_answered: bool) -> None:
         hand, now = self.controller, status.timestamp
-        hand.see(status)
+        hand.see(status, now)
         self.ask(now)
         if call:
             with contextlib.suppress(RobotiqError):

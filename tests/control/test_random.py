@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from robotiq_async import JAW, Finger, Inhibit, MotionInhibitedError, MoveResult, ObjectStatus, State
-from robotiq_async.control.motion import Move
+from robotiq_async.control.waiters import Move
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
 from robotiq_async.values.states import RUNNING
 from tests.control.held_parts import JudgedScan

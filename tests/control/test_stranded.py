@@ -101,7 +101,7 @@ def test_a_reset_and_a_stop_work_as_ever() -> None:
 
 def test_a_stop_before_it_is_decided_ends() -> None:
     scan = found(goes=True)
-    scan.controller.see(scan.status())
+    scan.see()
     assert scan.controller.evidence.is_undecided
     scan.stop()
     assert not scan.last_image.go

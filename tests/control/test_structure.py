@@ -34,7 +34,7 @@ def way_of_a_status(scan: Scan) -> list[str]:
     before = sys.getprofile()
     sys.setprofile(note)
     try:
-        scan.controller.see(status)
+        scan.controller.see(status, scan.now)
         assert scan.controller.decide(scan.now) is None
     finally:
         sys.setprofile(before)

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.hands.options import LATE_POLLS, HandOptions, ReconnectPolicy
 from robotiq_async.local.cycle import READS
 from robotiq_async.local.ending import STOP_S
@@ -48,7 +48,7 @@ async def test_a_status_is_read_before_anything_is_written_and_the_write_follows
     here: Polled,
 ) -> None:
     await here.polls(3)
-    here.controller.command(Command(Finger.A, 100))
+    here.controller.command(changes(Finger.A, 100))
     del here.wire.calls[:]
     await here.polls(2)
     assert here.wire.calls[:3] == ["read", "write", "read"]
@@ -61,7 +61,7 @@ async def test_a_status_is_read_before_anything_is_written_and_the_write_follows
 
 async def test_a_halt_does_not_wait_for_the_tick_and_shifts_no_tick(here: Polled) -> None:
     await here.polls(3)
-    here.controller.command(Command(Finger.A, 200))
+    here.controller.command(changes(Finger.A, 200))
     await here.polls(3)
     await asyncio.sleep(POLL_S / 4)
     del here.wire.calls[:]
@@ -84,7 +84,7 @@ async def test_a_halt_does_not_wait_for_the_tick_and_shifts_no_tick(here: Polled
 async def test_a_request_that_is_no_stop_waits_for_the_tick(here: Polled) -> None:
     await here.polls(3)
     before = here.statuses[-1].timestamp
-    here.controller.command(Command(Finger.A, 200))
+    here.controller.command(changes(Finger.A, 200))
     here.run.note_request()
     await here.polls()
     assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
@@ -93,7 +93,7 @@ async def test_a_request_that_is_no_stop_waits_for_the_tick(here: Polled) -> Non
 async def test_decisions_use_the_status_just_read(here: Polled) -> None:
     """Another client resets it between two polls: a command that was waiting would activate it again."""
     await here.polls(3)
-    here.controller.command(Command(Finger.A, 100))
+    here.controller.command(changes(Finger.A, 100))
     here.wire.gripper.write(0, Request().registers)
     await here.polls(3)
     assert here.machine.state is State.RESET
@@ -105,7 +105,7 @@ async def test_a_write_that_was_not_acknowledged_is_published_as_such_and_never_
 ) -> None:
     await here.polls(3)
     here.wire.failing["write"] = LOST
-    here.controller.command(Command(Finger.A, 100))
+    here.controller.command(changes(Finger.A, 100))
     await here.polls(1)
     await asyncio.sleep(0.005)
     assert here.machine.state is State.DISCONNECTED
@@ -122,7 +122,7 @@ async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anythi
 ) -> None:
     """Another client's write, or a new position of an axis, must be seen before the next write."""
     await here.polls(3)
-    here.controller.command(Command(Finger.A, 100))
+    here.controller.command(changes(Finger.A, 100))
 
     def hold_up() -> None:
         here.wire.gripper.write(0, Request().registers)
@@ -158,7 +158,7 @@ async def test_when_the_loop_was_held_up_between_two_cycles_a_stop_reads_first(h
 
 async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(here: Polled) -> None:
     await here.polls(3)
-    here.controller.command(Command(Finger.A, 100))
+    here.controller.command(changes(Finger.A, 100))
 
     def hold_up() -> None:
         here.loop.hold_up(0.1)
@@ -286,7 +286,7 @@ async def test_whatever_keeps_a_link_from_being_opened_again_is_a_failed_try(why
 
 async def test_whatever_keeps_a_link_from_being_opened_for_a_stop_is_a_failed_try() -> None:
     async with polled() as here:
-        here.controller.command(Command(Finger.ABC, 255, 0))
+        here.controller.command(changes(Finger.ABC, 255, 0))
         await here.polls(10)
         here.wire.failing = {"read": LOST, "write": LOST, "open": RuntimeError("can't start new thread")}
         here.run.request_stop(halt=True)

@@ -7,7 +7,7 @@ import logging
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.hands.options import ReconnectPolicy
 from robotiq_async.local.ending import STOP_S
 from robotiq_async.values.enums import Finger, State
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.virtual_time
 
 async def moves(here: Polled, position: int = 200, speed: int = 0, polls: int = 20) -> None:
     """Send the fingers off."""
-    here.controller.command(Command(Finger.ABC, position, speed))
+    here.controller.command(changes(Finger.ABC, position, speed))
     await here.polls(polls)
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.local.session import Session
 from robotiq_async.values.enums import Finger, State, Trigger
 from robotiq_async.values.errors import (
@@ -106,7 +106,7 @@ async def test_a_first_contact_that_fails_is_the_end() -> None:
 async def test_callers_that_wait_when_a_session_ends_get_the_reason(session: Session) -> None:
     state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
     position = asyncio.create_task(
-        session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
+        session.answered(lambda waiter: session.controller.command(changes(Finger.A, 100), waiter))
     )
     stream = session._channels.transitions.open(None)
     await asyncio.sleep(0)
@@ -187,7 +187,7 @@ async def test_a_write_that_is_due_leaves_before_anybody_hears_of_it(
         case "hold":
             await session.answered(lambda waiter: controller.hold(Finger.ABC, waiter))
         case "command":
-            await session.answered(lambda waiter: controller.command(Command(Finger.A, 0), waiter))
+            await session.answered(lambda waiter: controller.command(changes(Finger.A, 0), waiter))
         case "reset":
             await session.reach({State.RESET}, 5.0, what="", ask=controller.reset, failing={})
         case _:
@@ -253,7 +253,7 @@ async def test_callers_that_wait_when_the_task_fails_get_an_error(caplog: pytest
     async with running() as (_, session):
         state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
         await asyncio.sleep(0)
-        session.controller.command(Command(Finger.A, 256))  # checked above; here it has no place in a byte
+        session.controller.command(changes(Finger.A, 256))  # checked above; here it has no place in a byte
         with pytest.raises(ConnectionLostError, match="internal error: ValueError"):
             await state
         assert session.is_over

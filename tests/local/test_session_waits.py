@@ -7,7 +7,7 @@ from collections.abc import Awaitable
 
 import pytest
 
-from robotiq_async.control.pending import Command
+from robotiq_async.control.pending import changes
 from robotiq_async.hands.options import ReconnectPolicy
 from robotiq_async.local.session import Session
 from robotiq_async.values.enums import Fault, Finger, State
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.virtual_time
 
 
 def asking(session: Session) -> Awaitable[None]:
-    return session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
+    return session.answered(lambda waiter: session.controller.command(changes(Finger.A, 100), waiter))
 
 
 async def test_a_request_ends_with_the_acknowledgement_or_is_refused_at_once() -> None:
@@ -61,7 +61,7 @@ async def test_a_state_of_the_request_itself_is_returned_though_another_follows_
     session: Session,
 ) -> None:
     def ask() -> None:
-        session.controller.command(Command(Finger.A, 100))
+        session.controller.command(changes(Finger.A, 100))
         session.controller.reset()
 
     reached = await session.reach({State.RUNNING_CC}, 1.0, what="", ask=ask)
