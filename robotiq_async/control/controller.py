@@ -10,7 +10,6 @@ over and not answered: what they do then may hold up the loop, and the write goe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -23,7 +22,6 @@ from ..values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.states import RUNNING, SEEN
 from ..values.status import RobotiqStatus
@@ -55,19 +53,16 @@ class NextWrite(NamedTuple):
 class Controller:
     """State, requests and moves of one hand.
 
-    Every axis has ``speed`` and ``force``, 0..255, until set otherwise; ``machine`` is in DISCONNECTED. The
-    ``ledger`` is for the next session of the same gripper, too: its writes may still act, and contacts last.
+    The ``first`` image has the speed and the force of each axis until set otherwise; ``machine`` is in
+    DISCONNECTED. The ``ledger`` is for the next session of the gripper, too: its writes may still act.
     """
 
     def __init__(
         self,
         machine: StateMachine,
-        speed: int,
-        force: int,
+        first: Request,
         write_spacing: float = 0.0,
-        model: Model = THREE_FINGER,
         before: Ledger | None = None,
-        assumed: Mapping[tuple[Finger, str], int] | None = None,
         ended: AnswerCallers = fail,
     ) -> None:
         """``ended`` gets the callers whom a request has ended, and the error for each."""
@@ -75,7 +70,7 @@ class Controller:
         self.status: RobotiqStatus | None = None  # the newest; None before the first
         self.activates: bool = False  # whether a gripper that is found reset is activated
         self.foreign_commands: int = 0  # how often another client was seen to command the gripper
-        self.ledger: Final = Ledger(speed, force, model, machine.log, before, assumed)
+        self.ledger: Final = Ledger(first, machine.log, before)
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
         # forget it. A stop does not wait; it is repeated.
         self._spacing: Final = write_spacing
@@ -201,11 +196,11 @@ class Controller:
         status = self.evidence.status
         if self.ledger.activation is not None:
             self._duty = Stop(StopLevel.RESET)
-        elif status is not None and level is StopLevel.KEEP:
+        elif level is StopLevel.KEEP and status is not None:
             keeping = Keeping(status, self._why_no_grip, self.machine.log)
             self._duty = keeping.see(self.ledger, status)
         else:
-            self._duty = None if status is None else Stop(StopLevel.SHUTDOWN)
+            self._duty = Stop(StopLevel.SHUTDOWN)
 
     # -- what follows from that ------------------------------------------------------------------------
 
@@ -350,13 +345,11 @@ class Controller:
                 ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
         if condition is before:
             return
-        match before in FOLLOWS, condition:
-            case True, Trigger.SEEN_FAULT:
-                fail(requests.drop(holds=False), GripperFaultError(status.fault))
-            case True, Trigger.SEEN_RELEASED:
-                fail(self._drop_all(), GripperFaultError(status.fault))
-            case True, Trigger.SEEN_BUSY | Trigger.SEEN_RESET | Trigger.SEEN_STRANDED:
-                fail(self._drop_all(), NotActivatedError("the gripper lost its activation"))
+        fault, lost = GripperFaultError(status.fault), NotActivatedError("the gripper lost its activation")
+        if before in FOLLOWS and condition not in FOLLOWS:
+            fail(self._drop_all(), fault if condition is Trigger.SEEN_RELEASED else lost)
+        elif before in FOLLOWS and condition is Trigger.SEEN_FAULT:
+            fail(requests.drop(holds=False), fault)
         if condition is Trigger.SEEN_FAULT and status.activation_echo:
             # When it clears [manual 2012, 4.7: if it is minor], no motion may resume, and none begin that was
             # sent just before and does not act yet. Which axes need it is decided when it is written.
@@ -461,10 +454,9 @@ class Controller:
             self._finish(duty, status)
         elif image is not None:
             # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
-            pending = self._requests.pending
-            return self._send(
-                image, status, now, replace(pending, hold=NO_AXES) if duty.is_halt else pending, duty
-            )
+            left = self._requests.pending
+            left = replace(left, hold=NO_AXES) if duty.is_halt else left
+            return self._send(image, status, now, left, duty)
         return None
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:

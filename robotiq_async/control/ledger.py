@@ -33,15 +33,13 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from itertools import takewhile
 from typing import Final
 
 from ..runtime.logger import Log, log
 from ..values.enums import NO_AXES, Finger, Trigger
-from ..values.model import THREE_FINGER, Model
 from ..values.registers import Echo
-from ..values.request import AxisRequest, Request
+from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
 from .entry import Begun, Entry
@@ -59,24 +57,13 @@ NEVER: Final = float("-inf")
 
 
 class Ledger:
-    """The entries, the oldest first. Every axis has ``speed`` and ``force`` until they are set otherwise."""
+    """The entries, the oldest first.
 
-    def __init__(
-        self,
-        speed: int,
-        force: int,
-        model: Model = THREE_FINGER,
-        log: Log = log,
-        before: Ledger | None = None,
-        assumed: Mapping[tuple[Finger, str], int] | None = None,
-    ) -> None:
-        """``before`` is the ledger of the session before: what it has written may still act."""
-        has = assumed or {}
-        axes = tuple(
-            AxisRequest(0, has.get((axis, "speed"), speed), has.get((axis, "force"), force))
-            for axis in model.axes
-        )
-        first = Request(axes=axes, model=model)
+    The ``first`` image was never written: it has the speed and the force of each axis until others are set.
+    ``before`` is the ledger of the session before: what it has written may still act.
+    """
+
+    def __init__(self, first: Request, log: Log = log, before: Ledger | None = None) -> None:
         # The certain ones that a status may show, up to the newest that showed; and those that act after it.
         # These are replaced and never changed, as another thread may ask whether something moves.
         self._past = deque([Entry(first, first.echo, False, NEVER, NEVER)])
@@ -89,7 +76,7 @@ class Ledger:
         # reply; so the age of a write is measured by this.
         self.now: Moment = Moment(0.0, 0)
         self.ours: Finger = NO_AXES  # the axes that may move because of us: we gave them their position
-        self.requests: Final = RecentRequests(model)
+        self.requests: Final = RecentRequests(first.model)
         self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
         # One that ours have begun; stopping the hand takes it back.

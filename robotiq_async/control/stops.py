@@ -103,10 +103,8 @@ class Stop(Duty):
 
     def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
         """The image to write now: the first if there is anything to stop, or the last if it is due again."""
-        if not self.writes and self.has_cause(ledger, status):
-            return self.first_image(ledger, status)
         if not self.writes:
-            return Ended() if self.level is StopLevel.SHUTDOWN else None
+            return self.first_image(ledger, status) if self.has_cause(ledger, status) else Ended()
         entry, is_early, _ = self.writes[-1]
         # An early one whatever shows: the gripper may yet forget it [manual 2014, p. 75].
         return entry.image if is_early or (self._rules(status)[0] and ledger.acts(entry)) else None

@@ -47,6 +47,7 @@ from ..values.errors import (
 )
 from ..values.events import Transition
 from ..values.move_result import MoveResult
+from ..values.request import AxisRequest, Request
 from ..values.states import RUNNING, SEQUENCES
 from ..values.status import RobotiqStatus
 from .news import UnreachedNews
@@ -107,7 +108,7 @@ class Session:
     ) -> None:
         self.options = options
         self.machine = machine
-        left = self._claim()
+        before = self._claim()
         self.loop: asyncio.AbstractEventLoop = asyncio.get_running_loop()
         self._channels = channels
         self._waiters = StateWaiters()
@@ -115,16 +116,13 @@ class Session:
         self.counters: Counters = Counters()
         self.unreached: UnreachedNews = UnreachedNews(options.log)
         self._publisher = Publisher(channels, machine)
-        self.controller: Controller = Controller(
-            machine,
-            options.speed,
-            options.force,
-            options.write_spacing,
-            options.model,
-            left,
-            assumed,
-            self._publisher.end,
+        has, speed, force = assumed or {}, options.speed, options.force
+        axes = tuple(
+            AxisRequest(0, has.get((axis, "speed"), speed), has.get((axis, "force"), force))
+            for axis in options.model.axes
         )
+        first, spacing = Request(axes=axes, model=options.model), options.write_spacing
+        self.controller: Controller = Controller(machine, first, spacing, before, self._publisher.end)
         self.controller.allow_activation(activate)
         try:
             link = options.make_transport()

@@ -16,7 +16,7 @@ from robotiq_async.values.enums import StopLevel, Trigger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.registers import Registers
-from robotiq_async.values.request import Request
+from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.states import TABLE
 from tests.register_words import with_object_status
 
@@ -28,6 +28,11 @@ DULL_POLLS = 4
 ACTIVATING_S = 0.2
 """Between two polls of an activation that is only a beginning: it takes many seconds."""
 ROUNDING_S = 1e-6
+
+
+def first_request(speed: int = 128, force: int = 64, model: Model = THREE_FINGER) -> Request:
+    """The image of a hand that has written none."""
+    return Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
 
 
 class Outcome:
@@ -111,10 +116,8 @@ class Scan:
         self._ended = Ended()
         self.controller: Controller = Controller(
             self.machine,
-            speed,
-            64,
+            first_request(speed, 64, model),
             spacing,
-            model,
             after.controller.ledger if after is not None and goes_on else None,
             ended=self._ended.add,
         )

@@ -19,7 +19,7 @@ from robotiq_async.values.enums import StopLevel
 from robotiq_async.values.model import MODELS, Model
 from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.scan import POLL_S, Outcome
+from tests.control.scan import POLL_S, Outcome, first_request
 from tests.register_words import status_of
 
 ACTIVE, RESET = status_of(0x39), status_of(0x00)
@@ -68,7 +68,7 @@ def test_whatever_is_asked_and_shown_ract_rises_and_ratr_is_set_only_where_it_wa
     model: Model, spacing: float, activates: bool, life: list[tuple[str, int, tuple[int, ...], bool]]
 ) -> None:
     machine = StateMachine()
-    hand = Controller(machine, 128, 64, spacing, model)
+    hand = Controller(machine, first_request(model=model), spacing)
     hand.activates = activates
     for number, (call, value, registers, is_answered) in enumerate(life):
         now = 100 + number * POLL_S

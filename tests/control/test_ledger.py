@@ -21,6 +21,7 @@ from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import EPSILON, image, shows
+from tests.control.scan import first_request
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
@@ -30,7 +31,7 @@ class History(Ledger):
     """The history of a gripper that reports a position at first; it answers and acknowledges at once."""
 
     def __init__(self, position: int = 0) -> None:
-        super().__init__(100, 50)
+        super().__init__(first_request(100, 50))
         self.written: list[Entry] = []
         self.look(shows(position, 0.0))
         self.adopt(self.latest)
@@ -362,7 +363,8 @@ def test_settings_of_fingers_at_rest_are_not_remembered_for_ever() -> None:
 
 def test_an_adopted_image_may_differ_from_its_echo() -> None:
     """Simple control: B, C and the scissor echo 0 and have other requests."""
-    ledger, status = Ledger(100, 50), status_of(0x39, 0xFF, echo=(80, 0, 0, 0), position=(80, 80, 80, 60))
+    ledger = Ledger(first_request(100, 50))
+    status = status_of(0x39, 0xFF, echo=(80, 0, 0, 0), position=(80, 80, 80, 60))
     ledger.update(status, 0.0)
     assert ledger.match is None
     ledger.adopt(status)
@@ -428,12 +430,12 @@ def test_of_images_that_show_alike_the_newest_that_has_arrived_is_the_one_in_for
 
 
 def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> None:
-    assert Ledger(128, 64).base == Request(axes=(AxisRequest(0, 128, 64),) * 4)
+    assert Ledger(first_request()).base == Request(axes=(AxisRequest(0, 128, 64),) * 4)
 
 
 def found(status: RobotiqStatus) -> Ledger:
     """The ledger of a gripper that another client has commanded, and that the hand has found."""
-    ledger = Ledger(100, 50)
+    ledger = Ledger(first_request(100, 50))
     ledger.update(status, status.timestamp)
     ledger.adopt(status)
     return ledger

@@ -15,7 +15,7 @@ from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.move_result import MoveResult
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.scan import Ended, Outcome
+from tests.control.scan import Ended, Outcome, first_request
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
@@ -158,7 +158,7 @@ def test_a_result_does_not_change_with_what_is_seen_later() -> None:
 
 # -- the moves that run ------------------------------------------------------------------------------------
 
-LEDGER = Ledger(128, 64)
+LEDGER = Ledger(first_request())
 ENDED = Ended()
 ENTRY = LEDGER.last
 ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)
@@ -196,7 +196,7 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
 def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
     each, outcome = move()
     moves = live(each)
-    ledger = Ledger(128, 64)
+    ledger = Ledger(first_request())
     write(moves, ledger.write(ledger.base, A, 1.0))
     moves.end_arrived(ARRIVED, ledger)
     assert not outcome.answers
@@ -216,7 +216,7 @@ def test_a_move_takes_in_currents_from_its_write_on() -> None:
 
 
 def test_a_later_write_does_not_carry_an_earlier_move() -> None:
-    (first, _), (second, _), later = move(axes=A), move(axes=B), Ledger(128, 64).last
+    (first, _), (second, _), later = move(axes=A), move(axes=B), Ledger(first_request()).last
     moves = live(first)
     write(moves)
     ask(moves, second)

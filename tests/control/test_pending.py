@@ -15,7 +15,7 @@ from robotiq_async.control.waiters import Move, fail
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
-from tests.control.scan import Ended, Outcome
+from tests.control.scan import Ended, Outcome, first_request
 
 A, B, C, S = THREE_FINGER.axes
 ABC, NONE = Finger.ABC, Finger(0)
@@ -197,7 +197,7 @@ def test_a_halt_takes_the_holds_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(changes(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Ledger(128, 64).last, replace(requests.pending, hold=NONE))
+    requests.sending(Ledger(first_request()).last, replace(requests.pending, hold=NONE))
     assert requests.pending == Pending(speeds={B: 50})
     requests.acknowledged()
     assert (holder.answers, waiting(requests)) == ([None], [setter])
@@ -207,7 +207,7 @@ def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(changes(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Ledger(128, 64).last, requests.pending)
+    requests.sending(Ledger(first_request()).last, requests.pending)
     requests.acknowledged()
     assert requests.pending == Pending(speeds={B: 50}, hold=A)
     assert waiting(requests) == [setter, holder]

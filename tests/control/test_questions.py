@@ -16,7 +16,7 @@ from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import image, shows
-from tests.control.scan import POLL_S
+from tests.control.scan import POLL_S, first_request
 from tests.control.test_gate import CALLS, steps
 
 
@@ -37,7 +37,7 @@ class Hand:
 
     def __init__(self, *, is_asked: bool, activates: bool) -> None:
         self.machine = StateMachine()
-        self.controller = Controller(self.machine, 128, 64, 0.01, THREE_FINGER)
+        self.controller = Controller(self.machine, first_request(), 0.01)
         self.controller.activates = activates
         self.is_asked = is_asked
         self.done: list[object] = []
@@ -76,7 +76,7 @@ def test_a_hand_that_is_asked_everything_does_what_one_does_that_is_asked_nothin
 
 def known_to_rest(*, is_asked: bool) -> Finger:
     """The axes that are known to rest just after a fault, in which a request of theirs was echoed."""
-    ledger, at = Ledger(128, 64), 1.0
+    ledger, at = Ledger(first_request()), 1.0
     ledger.update(shows(100, at), at)
     ledger.adopt(shows(100, at))
     ledger.write(image(200), Finger.ALL, at)

@@ -14,6 +14,7 @@ from robotiq_async.values.enums import StopLevel as Level
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import BUSY, FAULTY, READY, RELEASED, RESET, RUNNING
+from tests.control.scan import first_request
 from tests.register_words import status_of
 
 IMAGE = Request(
@@ -39,7 +40,7 @@ class Stopping:
     """A stop of a gripper that follows IMAGE. Each status comes when the write acts by its age."""
 
     def __init__(self, level: Level, *, is_early: bool = False) -> None:
-        self.ledger, self.now = Ledger(0, 0), 0.0
+        self.ledger, self.now = Ledger(first_request(0, 0)), 0.0
         self.ledger.update(BEFORE, 0.0)
         self.ledger.adopt(BEFORE)
         self.ledger.write(IMAGE, NO_AXES, 0.0)
@@ -90,7 +91,7 @@ def test_a_stop_changes_these_bits_of_the_image(level: Level, expected: Request)
 @pytest.mark.parametrize("shown", [READY, RUNNING, BUSY, FAULTY, RELEASED, RESET])
 def test_a_reset_begins_for_any_status(shown: RobotiqStatus) -> None:
     """An emergency is not weighed."""
-    ledger = Ledger(0, 0)
+    ledger = Ledger(first_request(0, 0))
     ledger.update(shown, 0.0)
     ledger.adopt(shown)
     image = Stop(Level.RESET).next_image(ledger, shown)
@@ -99,7 +100,7 @@ def test_a_reset_begins_for_any_status(shown: RobotiqStatus) -> None:
 
 
 def test_a_shutdown_with_nothing_to_stop_writes_nothing() -> None:
-    ledger = Ledger(0, 0)
+    ledger = Ledger(first_request(0, 0))
     ledger.update(READY, 0.0)
     ledger.adopt(READY)
     assert Stop(Level.SHUTDOWN).next_image(ledger, READY) == Ended()

@@ -21,6 +21,7 @@ from robotiq_async.local.run import Run
 from robotiq_async.values.enums import State, Trigger
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.status import RobotiqStatus
+from tests.control.scan import first_request
 from tests.fake_transport import Wire
 from tests.local.sessions import options
 from tests.patience import patience
@@ -60,7 +61,7 @@ class Polled:
         channels.numbers = itertools.count(7)
         given = replace(options(self.wire, policy), poll_interval=poll_interval)
         publisher = Publisher(channels, self.machine)
-        self.controller = Controller(self.machine, 128, 64, ended=publisher.end)
+        self.controller = Controller(self.machine, first_request(), ended=publisher.end)
         self.controller.allow_activation(activate)
         self.run = Run(RunParts(self.wire, self.controller, self.counters, publisher, given))
         self.at_next_status: Callable[[], None] | None = None
