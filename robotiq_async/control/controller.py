@@ -408,7 +408,7 @@ class Controller:
             is_known = self.ledger.restart(status)
         else:  # it had nothing to do; WF_ shows for a moment, as DO_ leads nowhere else in the table
             is_known = self.ledger.match is not None
-            duty.written(self.ledger.shown, status)
+            duty.written(self.ledger.shown)
             self._update_state(Trigger.DELIVERED)
         self._duty = None
         # On a new link a hand that ends stops the fingers before the condition is decided.
@@ -493,10 +493,11 @@ class Controller:
         may_reset = self.ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
         moved = NO_AXES if left.positions else self._requests.pending.moved
-        entry = self.ledger.write(image, moved, now, activates=activates)
+        is_early = now < self._free_at
+        entry = self.ledger.write(image, moved, now, activates=activates, is_early=is_early)
         self._requests.sending(entry, left)
         if duty is not None:
-            duty.written(entry, status, is_early=now < self._free_at)
+            duty.written(entry)
         self._free_at = now + self._spacing
         return image
 

@@ -25,6 +25,7 @@ class Entry:
     sent: float  # monotonic seconds; of a write lost with the link the latest at which it may have arrived
     acknowledged: float | None = None  # when; None before that
     is_doubtful: bool = False  # whether it may act late, or never
+    is_early: bool = False  # it came within write_spacing of another: the gripper may forget it
     held: Finger = NO_AXES  # the axes that it is to hold
 
     @property

@@ -152,7 +152,12 @@ class Evidence:
         shows = reg.gFLT.read(status.registers) == _CODE
         if not shows or (self._row and asked - self._row[-1] > SILENCE_S):
             if _may_pass(self._since_silence):
-                self._note_passed()
+                self.passed += 1
+                if self.passed == 1 and self._log is not None:
+                    self._log.info(
+                        "the gripper showed fault 0x09 for a moment, as some do after a second without a "
+                        "poll: ignored, and from here on only counted"
+                    )
             self._since_silence.clear()
         if not shows:
             self._row.clear()
@@ -161,14 +166,6 @@ class Evidence:
             del reads[LASTS_READS - 1 :]  # the first ones and the last say enough
             reads.append(asked)
         return without_fault(status) if _may_pass(self._since_silence) else status
-
-    def _note_passed(self) -> None:
-        self.passed += 1
-        if self.passed == 1 and self._log is not None:
-            self._log.info(
-                "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
-                "ignored, and from here on only counted"
-            )
 
 
 def _may_pass(reads: list[float]) -> bool:

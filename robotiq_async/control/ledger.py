@@ -211,10 +211,12 @@ class Ledger:
 
     # -- what is written -------------------------------------------------------------------------------
 
-    def write(self, image: Request, axes: Finger, now: float, *, activates: bool = False) -> Entry:
+    def write(
+        self, image: Request, axes: Finger, now: float, *, activates: bool = False, is_early: bool = False
+    ) -> Entry:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
-        entry = Entry(image, image.echo, is_ours=True, sent=now)
+        entry = Entry(image, image.echo, is_ours=True, sent=now, is_early=is_early)
         if self.limits.limited:
             self.limits.forget(axes)
         if self.contacts.shown:

@@ -188,7 +188,8 @@ class OpenRequests:
         """Answer the callers of halts if these are over, and those that have waited too long in any case."""
         # However often a halt is replaced by a newer one, its callers do not wait for ever.
         since = ledger.now.time - MOST_HALTS * WINDOW_S
-        halts = [call for call in self.calls if call.halts and (is_over or call.was_written_by(since))]
+        halts = [each for each in self.calls if each.halts]
+        halts = [each for each in halts if is_over or (each.entry is not None and each.entry.time <= since)]
         if halts and status.go_echo:
             error = StateTimeoutError(
                 f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "

@@ -43,7 +43,7 @@ class Procedure(Duty):
 
     def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
         """The image to write now; None if it waits."""
-        if self.writes and not ledger.acts(self.writes[-1].entry):
+        if self.writes and not ledger.acts(self.writes[-1]):
             return None
         try:
             return self._steps.send(status)

@@ -21,12 +21,9 @@ from ..values.status import RobotiqStatus
 class StateMachine:
     """The state of one hand. It is a view: the controller works out which state holds, and shows it here."""
 
-    def __init__(
-        self, changed: Callable[[State, State, Trigger], None] = lambda *_: None, *, log: Log = log
-    ) -> None:
+    def __init__(self, log: Log = log) -> None:
         self.log = log
-        # Called with source, target and trigger after each change.
-        self.changed: Callable[[State, State, Trigger], None] = changed
+        self.changed: Callable[[State, State, Trigger], None] = lambda *_: None
         self.why_down: object = None  # why the link is down, for the error of what is refused then
         self.state: State = State.DISCONNECTED  # only show() sets it
         self.inhibited: Inhibit | None = None  # only inhibit() and permit() set it; outlasts runs
@@ -83,7 +80,7 @@ class StateMachine:
         self.changed(source, target, trigger)
 
     def begin(self, changed: Callable[[State, State, Trigger], None]) -> None:
-        """A run begins: call this function after each change from here on."""
+        """A run begins: call this function with source, target and trigger after each change from here on."""
         self.changed, self.why_down = changed, None
 
     def note_down(self, why: object) -> None:

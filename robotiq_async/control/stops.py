@@ -45,14 +45,6 @@ REST_S: Final = 0.05
 not show yet."""
 
 
-class Write(NamedTuple):
-    """One write of a stop or a procedure."""
-
-    entry: Entry
-    is_early: bool  # it came within write_spacing of another: the gripper may have forgotten it
-    was_active: bool  # whether the gripper was, before it: what activates already is not ours to take back
-
-
 class Ended(NamedTuple):
     """A duty is over, and has nothing to write; ``why`` it has failed, if it has."""
 
@@ -66,7 +58,7 @@ class Duty:
     is_halt = False  # in all others a status counts for the duty alone
 
     def __init__(self, states: tuple[State, State] | None = None) -> None:
-        self.writes: Final[list[Write]] = []
+        self.writes: Final[list[Entry]] = []
         self._states: Final = states
 
     @property
@@ -77,10 +69,10 @@ class Duty:
     @property
     def is_delivered(self) -> bool:
         """Whether its first write was acknowledged."""
-        return bool(self.writes) and self.writes[0].entry.acknowledged is not None
+        return bool(self.writes) and self.writes[0].acknowledged is not None
 
-    def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool = False) -> None:
-        self.writes.append(Write(entry, is_early, status.is_activated))
+    def written(self, entry: Entry) -> None:
+        self.writes.append(entry)
 
 
 class Stop(Duty):
@@ -90,6 +82,7 @@ class Stop(Duty):
         super().__init__((State.DO_RESET, State.WF_RESET) if level is StopLevel.RESET else None)
         self.level: Final = level
         self.is_halt = level is StopLevel.HALT
+        self._was_active = False  # before its first write: what activates already is not ours to take back
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its first write leaves before the next read."""
@@ -104,10 +97,11 @@ class Stop(Duty):
     def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
         """The image to write now: the first if there is anything to stop, or the last if it is due again."""
         if not self.writes:
+            self._was_active = status.is_activated
             return self.first_image(ledger, status) if self.has_cause(ledger, status) else Ended()
-        entry, is_early, _ = self.writes[-1]
+        last = self.writes[-1]
         # An early one whatever shows: the gripper may yet forget it [manual 2014, p. 75].
-        return entry.image if is_early or (self._rules(status)[0] and ledger.acts(entry)) else None
+        return last.image if last.is_early or (self._rules(status)[0] and ledger.acts(last)) else None
 
     def first_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         if self.level is StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
@@ -120,7 +114,7 @@ class Stop(Duty):
 
     def _rules(self, status: RobotiqStatus) -> tuple[bool, bool]:
         """Whether its last image, once it acts, is due again; and whether the stop is over then."""
-        entry, is_reset = self.writes[-1].entry, classify(status) is Trigger.SEEN_RESET
+        entry, is_reset = self.writes[-1], classify(status) is Trigger.SEEN_RESET
         match self.level:
             case StopLevel.RESET:
                 return status.activation_echo, is_reset
@@ -142,17 +136,16 @@ class Stop(Duty):
             return self
         if self.is_halt and not status.go_echo and not ledger.may_set_go:
             return None  # then it need not act
-        return None if self._rules(status)[1] and ledger.acts(self.writes[-1].entry) else self
+        return None if self._rules(status)[1] and ledger.acts(self.writes[-1]) else self
 
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its rACT activates a gripper that another client has reset just before, or is about to."""
         # Two clients within one device cycle can do that [follows from Modbus].
-        if not self.is_delivered or not self.writes[-1].entry.image.activate:
+        if not self.is_delivered or not self.writes[-1].image.activate:
             return False
-        entry, _, was_active = self.writes[-1]
         if self.level is StopLevel.HALT:
             return classify(status) is Trigger.SEEN_RESET or is_activating(status)
-        return was_active and ledger.acts(entry) and is_activating(status)
+        return self._was_active and ledger.acts(self.writes[-1]) and is_activating(status)
 
 
 class Keeping(Stop):
@@ -176,7 +169,7 @@ class Keeping(Stop):
         """Return a shutdown in any doubt, this one, or None once every axis rests."""
         ledger.update_rest(status)
         why = self._why_no_grip
-        if not self.writes or ledger.acts(self.writes[-1].entry):  # if not, a hold will overwrite what shows
+        if not self.writes or ledger.acts(self.writes[-1]):  # if not, a hold will overwrite what shows
             why = why or self._doubt(ledger, status)
             self._since = min(self._since, ledger.now.time) if self._rests(ledger, status) else math.inf
         if why:

@@ -43,9 +43,6 @@ class Call:
     def written(self, entry: Entry) -> None:
         self.entry = entry
 
-    def was_written_by(self, time: float) -> bool:
-        return self.entry is not None and self.entry.time <= time
-
 
 class Move(Call):
     """One awaited move to a position in counts. Its caller waits until all its axes have arrived."""

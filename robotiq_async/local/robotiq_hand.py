@@ -201,7 +201,7 @@ class RobotiqHand(Hand):
             keep_grip=options.keep_grip,
             model=options.model,
         )
-        self._machine = StateMachine(log=options.log)
+        self._machine = StateMachine(options.log)
         self._assumed: Mapping[tuple[Finger, str], int] = {}
 
     # -- lifetime --------------------------------------------------------------------------------------

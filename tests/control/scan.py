@@ -112,7 +112,8 @@ class Scan:
                 lambda: self.now, device_cycle=device_cycle, spread=False, model=model, **options
             )
         self.transitions: list[tuple[State, State, Trigger]] = []
-        self.machine = StateMachine(self._change)
+        self.machine = StateMachine()
+        self.machine.begin(self._change)
         self._ended = Ended()
         self.controller: Controller = Controller(
             self.machine,

@@ -27,7 +27,8 @@ class Recorded:
 
     def __init__(self, state: State) -> None:
         self.changes: list[tuple[State, State, Trigger]] = []
-        self.machine = StateMachine(lambda *change: self.changes.append(change))
+        self.machine = StateMachine()
+        self.machine.begin(lambda *change: self.changes.append(change))
         self.machine.show(state, Trigger.ASK_START)
         assert self.machine.state is state
         self.changes.clear()
@@ -196,7 +197,8 @@ def test_a_refusal_names_what_was_asked_the_state_and_the_states_that_would_do()
 
 def test_a_machine_begins_disconnected_and_tells_a_change_when_it_has_happened() -> None:
     seen: list[State] = []
-    machine = StateMachine(lambda *_: seen.append(machine.state))
+    machine = StateMachine()
+    machine.begin(lambda *_: seen.append(machine.state))
     assert machine.state is State.DISCONNECTED
     machine.show(State.RESET, Trigger.SEEN_RESET)
     machine.show(State.RESET, Trigger.SEEN_RESET)

@@ -54,8 +54,7 @@ class Stopping:
         self.write(image, is_early=is_early)
 
     def write(self, image: Request, *, is_early: bool = False) -> None:
-        entry = self.ledger.write(image, NO_AXES, self.now)
-        self.stop.written(entry, BEFORE, is_early=is_early)
+        self.stop.written(self.ledger.write(image, NO_AXES, self.now, is_early=is_early))
         self.ledger.acknowledge(self.now)
 
     def see(self, status: RobotiqStatus, after: float = WINDOW_S) -> bool:

@@ -51,7 +51,8 @@ class Polled:
     ) -> None:
         self.wire = Wire()
         self.changes: list[tuple[State, State, Trigger]] = []
-        self.machine = StateMachine(lambda *change: self.changes.append(change))
+        self.machine = StateMachine()
+        self.machine.begin(lambda *change: self.changes.append(change))
         self.counters = Counters()
         self.statuses: list[RobotiqStatus] = []
         self.requests: list[SentRequest] = []
