@@ -328,7 +328,7 @@ class Controller:
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
-        """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
+        """A new condition, or an image that no entry explains: whose image acts."""
         ledger, requests = self.ledger, self._requests
         # It followed requests before (None: the link was down), it does now, an entry explains its image.
         match before and before in FOLLOWS, condition in FOLLOWS, ledger.match is not None:
@@ -343,8 +343,10 @@ class Controller:
                 self._adopt_other_client(status)  # before a fault's hold, which would undo what it wrote
             case _, False, False:
                 ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
-        if condition is before:
-            return
+
+    def _note_condition(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
+        """A new condition: what ends, what is held; on a new link the activation or reset that is due."""
+        requests, is_found, is_inhibited = self._requests, before is None, self.machine.inhibited is not None
         fault, lost = GripperFaultError(status.fault), NotActivatedError("the gripper lost its activation")
         if before in FOLLOWS and condition not in FOLLOWS:
             fail(self._drop_all(), fault if condition is Trigger.SEEN_RELEASED else lost)
@@ -353,13 +355,9 @@ class Controller:
         if condition is Trigger.SEEN_FAULT and status.activation_echo:
             # When it clears [manual 2012, 4.7: if it is minor], no motion may resume, and none begin that was
             # sent just before and does not act yet. Which axes need it is decided when it is written.
-            requests.merge_hold(ledger.ours, f"the gripper reports {status.fault.description}")
+            requests.merge_hold(self.ledger.ours, f"the gripper reports {status.fault.description}")
         elif condition not in FOLLOWS:
             requests.hold_only(NO_AXES)
-
-    def _note_condition(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
-        """Show a new condition; on a new link, begin the activation or the reset that is due."""
-        is_found, is_inhibited = before is None, self.machine.inhibited is not None
         is_reset = condition in (Trigger.SEEN_RESET, Trigger.SEEN_STRANDED)
         if is_found and is_reset and self.activates and not is_inhibited:
             self._begin(Trigger.ACTIVATES)

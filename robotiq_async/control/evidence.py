@@ -14,7 +14,7 @@ lasts.
 from __future__ import annotations
 
 from functools import cache
-from typing import Final, NamedTuple
+from typing import Final
 
 from ..runtime.logger import Log
 from ..values import registers as reg
@@ -78,24 +78,22 @@ def _classify(activation: int, fault: int, model: Model) -> Trigger:
     return Trigger.SEEN_BUSY
 
 
-class Stuck(NamedTuple):
-    """Statuses in a row that show rACT without an activation, and the same positions."""
+class Spell(list[float]):
+    """When the reads in a row that show the same were asked for: it counts once it lasts."""
 
-    positions: tuple[int, ...]
-    since: float  # when the first of them was asked for
-    until: float
-    reads: int = 1
+    def __init__(self, least: int, seconds: float) -> None:
+        super().__init__()
+        self._least: Final = least
+        self._seconds: Final = seconds
 
-    @classmethod
-    def after(cls, before: Stuck | None, status: RobotiqStatus, asked: float) -> Stuck:
-        positions = tuple(status.position(axis) for axis in status.model.axes)
-        if before is None or before.positions != positions:
-            return cls(positions, asked, asked)
-        return cls(positions, before.since, asked, before.reads + 1)
+    def add(self, asked: float) -> None:
+        del self[self._least - 1 :]  # the first ones and the last say enough
+        self.append(asked)
 
     @property
-    def is_long(self) -> bool:
-        return self.until - self.since >= STRANDED_S and self.reads >= STRANDED_READS
+    def is_open(self) -> bool:
+        """Whether it shows, and has not lasted yet."""
+        return bool(self) and (len(self) < self._least or self[-1] - self[0] < self._seconds)
 
 
 class Evidence:
@@ -106,21 +104,22 @@ class Evidence:
         self.condition: Trigger | None = None  # what it shows; None while the link is down
         self.passed: int = 0  # how often 0x09 has gone without having lasted
         self._log: Final = log
-        # When the reads in a row that have shown it were asked for: all, and those since the last silence.
-        self._row: Final[list[float]] = []
-        self._since_silence: Final[list[float]] = []
-        self._stuck: Stuck | None = None  # while the gripper shows what a stranded one does
+        # The reads that have shown it: all, and those since the last silence.
+        self._row: Final = Spell(LASTS_READS, LASTS_S)
+        self._since_silence: Final = Spell(LASTS_READS, LASTS_S)
+        # Those that have shown a stranded gripper, and its positions.
+        self._stuck: Final = Spell(STRANDED_READS, STRANDED_S)
+        self._stuck_at: tuple[int, ...] = ()
 
     @property
     def is_undecided(self) -> bool:
         """Whether the first statuses on a new link show 0x09, or what may be a stranded gripper."""
-        may_be_stranded = self._stuck is not None and not self._stuck.is_long
-        return self.condition is None and (self.may_pass or may_be_stranded)
+        return self.condition is None and (self.may_pass or self._stuck.is_open)
 
     @property
     def may_pass(self) -> bool:
         """Whether the next reads decide about 0x09. Never on a link so slow that each read ends a silence."""
-        return _may_pass(self._row)
+        return self._row.is_open
 
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
         """Take in a status; return its condition, or None while the first one on a new link is undecided."""
@@ -135,23 +134,27 @@ class Evidence:
             status = status if self.condition is Trigger.SEEN_FAULT else judged
             condition = classify(status)
         if condition is Trigger.SEEN_BUSY and status.is_reset and status.fault is Fault.NONE:
-            self._stuck = Stuck.after(self._stuck, status, asked)
-            condition = Trigger.SEEN_STRANDED if self._stuck.is_long else condition
+            before, self._stuck_at = self._stuck_at, tuple(map(status.position, status.model.axes))
+            if self._stuck_at != before:
+                self._stuck.clear()
+            self._stuck.add(asked)
+            condition = condition if self._stuck.is_open else Trigger.SEEN_STRANDED
         else:
-            self._stuck = None
+            self._stuck.clear()
         self.status = status
         if self.condition is not None or not self.is_undecided:
             self.condition = condition
         return self.condition
 
     def lost(self) -> None:
-        self.condition, self._stuck = None, None  # the next one is the first
+        self.condition = None  # the next one is the first
+        self._stuck.clear()
 
     def judged(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
         """Return a status without 0x09 until that has lasted; it was asked for at ``asked``."""
         shows = reg.gFLT.read(status.registers) == _CODE
         if not shows or (self._row and asked - self._row[-1] > SILENCE_S):
-            if _may_pass(self._since_silence):
+            if self._since_silence.is_open:
                 self.passed += 1
                 if self.passed == 1 and self._log is not None:
                     self._log.info(
@@ -162,15 +165,9 @@ class Evidence:
         if not shows:
             self._row.clear()
             return status
-        for reads in (self._row, self._since_silence):
-            del reads[LASTS_READS - 1 :]  # the first ones and the last say enough
-            reads.append(asked)
-        return without_fault(status) if _may_pass(self._since_silence) else status
-
-
-def _may_pass(reads: list[float]) -> bool:
-    """Whether it shows, and has not lasted in these reads."""
-    return bool(reads) and (len(reads) < LASTS_READS or reads[-1] - reads[0] < LASTS_S)
+        self._row.add(asked)
+        self._since_silence.add(asked)
+        return without_fault(status) if self._since_silence.is_open else status
 
 
 def without_fault(status: RobotiqStatus) -> RobotiqStatus:
