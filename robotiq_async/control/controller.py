@@ -191,8 +191,7 @@ class Controller:
             self._duty = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
-        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN, or an activation of ours."""
-        # An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
+        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN; an activation of ours by RESET."""
         status = self.evidence.status
         if self.ledger.activation is not None:
             self._duty = Stop(StopLevel.RESET)
@@ -371,7 +370,6 @@ class Controller:
             self._take_back(f"{why}: an activation or a release that continues is reset")
 
     def _advance(self, stop: Stop) -> None:
-        """Let a stop see the newest status."""
         ledger, judged = self.ledger, self.evidence.status
         assert judged is not None
         if stop.has_activated(ledger, judged):
@@ -384,7 +382,6 @@ class Controller:
             self._finish(stop, judged)
 
     def _take_back(self, why: str) -> None:
-        """End an activation or a release that must not go on."""
         self.machine.log.warning("%s", why)
         self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
 
@@ -514,8 +511,6 @@ class Controller:
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         duty, self._duty = self._duty, None
-        # A halt and a reset are not sent again: on return the axes that we move are held instead, and a
-        # sequence that continues is reset.
         if isinstance(duty, Stop) and duty.level in (StopLevel.HALT, StopLevel.RESET):
             self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
             self._owes_reset = self.is_driven

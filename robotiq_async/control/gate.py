@@ -69,9 +69,8 @@ def gate(
 ) -> Request:
     """The image as it may be written: ``activates`` or ``releases`` if it begins what was asked for."""
     # ``may_reset`` if an earlier image of ours may reset the gripper before this one acts.
-    # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
-    # activates [follows]. That is taken back: after a stop has_activated() in stops.py finds it, after a
-    # command or a hold sees_stray() in ledger.py.
+    # The race that is left: after a stop has_activated() in stops.py finds it, after a command or a hold
+    # sees_stray() in ledger.py.
     activate = image.activate and (activates or (status.activation_echo and not may_reset))
     release = image.release and releases
     if activate is image.activate and release is image.release:

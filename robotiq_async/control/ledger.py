@@ -182,7 +182,7 @@ class Ledger:
     def held(self, axes: Finger, status: RobotiqStatus, age: float = 0.0) -> dict[Finger, int]:
         """The axes of these that a hold must stop, and where it finds each; ``age`` is that of the status."""
         if not axes or not (base := self.base).go:
-            return {}
+            return {}  # rGTO = 0 stops every axis [manual 2014, p. 50]
         may_move = self.requests.may_move(status, self.now)
         axes &= ~self._pressing_again(status)
         acts_in = age + self._delay  # the time until a write that leaves now acts
@@ -193,7 +193,6 @@ class Ledger:
         }
 
     def _pressing_again(self, status: RobotiqStatus) -> Finger:
-        # To hold one that presses would end its grip.
         return self.contacts.pressing(status, self.base) & status.moving
 
     def _age(self, entry: Entry) -> float:

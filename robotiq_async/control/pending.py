@@ -1,8 +1,7 @@
 """Requests of callers: changes for the next write, those in flight, and the calls that wait for an answer.
 
-All requests between two writes are merged into one; the last value wins. A position, a speed or a force is
-sent as a change once and never again: it may move an axis. A hold can only stop one: over a lost link it
-remains unless a status has shown its write. One without a caller goes if another client takes the axis over.
+All requests between two writes are merged into one; the last value wins. Over a lost link a hold alone
+remains, unless a status has shown its write. One without a caller goes if another client takes the axis over.
 """
 
 from __future__ import annotations

@@ -62,12 +62,9 @@ def agrees(model: Model, request: int, what: ObjectStatus, position: int, direct
 
 def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger = NO_AXES) -> bool:
     """Whether an axis moves or is about to, so that a hold must ask for its present position."""
-    # An axis in contact keeps its request, and with it its grip; so does one at rest where it was asked to
-    # be. An axis may still show what the request before this one made it do: then the two disagree.
-    # ``may_move`` has the axes that show rest, and may move because of an earlier request.
-    if not base.go:
-        return False  # rGTO = 0 stops every axis [manual 2014, p. 50]
-    # A needless hold would cost an axis in contact its grip: it would be asked for where it is.
+    # An axis may still show what the request before this one made it do: then the two disagree. ``may_move``
+    # has the axes that show rest, and may move because of an earlier request. A needless hold would cost an
+    # axis in contact its grip: it would be asked for where it is.
     if axis in may_move:
         return base.position(axis) != status.position(axis)
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)

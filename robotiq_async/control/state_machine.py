@@ -1,8 +1,7 @@
 """The state of a hand, and whether a person has inhibited its motion.
 
-The state follows from what the hand does and what the gripper shows; the controller works it out, and the
-table in values/states.py has what it may be. Beside it stands a condition that a person sets,
-:class:`Inhibit`. While it does, all that may move an axis or make it press is refused, whatever the state.
+The table in values/states.py has which state may follow which. Beside it stands a condition that a person
+sets, :class:`Inhibit`: then all that may move an axis or make it press is refused, whatever the state.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Stops: a halt, a reset, and what ends a hand. Each has a level; a new one replaces the one before.
 
-The first write of a stop leaves before the read of its cycle: a gripper may obey and not answer. A stop may
-be written again, as it only ends motion: a gripper may acknowledge a write that comes soon after another one
-and forget it [manual 2014, pp. 58, 75: space them by 10 ms]; a first write that came so soon is written again
-before it counts. Keeping is the exception to all this.
+The first write of a stop leaves before the read of its cycle: a gripper may obey and not answer. It may also
+acknowledge a write that comes soon after another one and forget it [manual 2014, pp. 58, 75: space them by
+10 ms]; a first write that came so soon is written again before it counts. Keeping is the exception.
 """
 
 # Duty        Begun by                          First image          Over when
@@ -100,7 +99,7 @@ class Stop(Duty):
             self._was_active = status.is_activated
             return self.first_image(ledger, status) if self.has_cause(ledger, status) else Ended()
         last = self.writes[-1]
-        # An early one whatever shows: the gripper may yet forget it [manual 2014, p. 75].
+        # An early one whatever shows: the gripper may yet forget it.
         return last.image if last.is_early or (self._rules(status)[0] and ledger.acts(last)) else None
 
     def first_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
@@ -140,7 +139,6 @@ class Stop(Duty):
 
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its rACT activates a gripper that another client has reset just before, or is about to."""
-        # Two clients within one device cycle can do that [follows from Modbus].
         if not self.is_delivered or not self.writes[-1].image.activate:
             return False
         if self.level is StopLevel.HALT:
@@ -149,12 +147,10 @@ class Stop(Duty):
 
 
 class Keeping(Stop):
-    """The weakest stop: leaves rGTO set if every axis rests.
+    """The weakest stop: leaves rGTO set if every axis is seen at rest under a known request.
 
     Clearing rGTO is what stops the fingers for certain, but what then becomes of a grip is in no public
-    source. So rGTO stays set if every axis is seen at rest under a known request. Axes that move are held
-    first, once, as after a cancelled move. In any doubt rGTO is cleared. docs/decisions/keeping-a-grip.md has
-    the reasons.
+    source. Axes that move are held first, once. docs/decisions/keeping-a-grip.md has the reasons.
     """
 
     def __init__(self, status: RobotiqStatus, why_no_grip: str, log: Log) -> None:

@@ -67,6 +67,17 @@ def test_a_grip_is_kept_and_an_axis_at_rest_is_left_alone(scan: Scan) -> None:
     assert scan.latest.finger_status(A) is ObjectStatus.CONTACT_CLOSING
 
 
+def test_behind_a_halt_nothing_moves_and_nothing_is_written(scan: Scan) -> None:
+    scan.move(200)
+    scan.run(0.5)
+    scan.halted()
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold()
+    scan.step()
+    assert (len(scan.written), asked.answers, scan.state) == (written, [None], State.RUNNING_IDLE)
+
+
 def test_where_nothing_moves_nothing_is_written(scan: Scan) -> None:
     scan.moved(100)
     scan.run(0.5)
