@@ -46,7 +46,8 @@
 #
 # Procedures raise rACT or rATR. While one runs, it alone judges what a status shows. When it ends, no write
 # of ours is on its way: the ledger begins again with our last image, and what shows in place of it is another
-# client's. An activation of ours is remembered until its end shows: stopping the hand takes it back.
+# client's. An activation and a release of ours are remembered until their end shows: stopping the hand ends
+# them by a reset, and leaves those of others alone.
 #
 # Another client is seen by a status that shows none of our images, nor one with software limits in place of
 # requests (limits.py), or by an activation that is not ours. What it writes between our last read and our

@@ -191,9 +191,9 @@ class Controller:
             self._duty = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
-        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN; an activation of ours by RESET."""
+        """Begin to stop the fingers, if any may move: by KEEP or SHUTDOWN, in a sequence of ours by RESET."""
         status = self.evidence.status
-        if self.ledger.activation is not None:
+        if self.ledger.begun is not None:
             self._duty = Stop(StopLevel.RESET)
         elif level is StopLevel.KEEP and status is not None:
             keeping = Keeping(status, self._why_no_grip, self.machine.log)
@@ -272,7 +272,7 @@ class Controller:
     def may_have_to_stop(self) -> bool:
         """Whether a status was read, or the last session has left something that may still act."""
         ledger = self.ledger
-        return self.status is not None or ledger.activation is not None or not ledger.is_settled
+        return self.status is not None or ledger.begun is not None or not ledger.is_settled
 
     def _view(self) -> State:
         """The state: that of the duty; if it makes none, what the gripper shows."""
@@ -489,7 +489,7 @@ class Controller:
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
         moved = NO_AXES if left.positions else self._requests.pending.moved
         is_early = now < self._free_at
-        entry = self.ledger.write(image, moved, now, activates=activates, is_early=is_early)
+        entry = self.ledger.write(image, moved, now, begins=activates or releases, is_early=is_early)
         self._requests.sending(entry, left)
         if duty is not None:
             duty.written(entry)

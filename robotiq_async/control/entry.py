@@ -1,4 +1,4 @@
-"""One entry of the ledger, and an activation that one may have begun."""
+"""One entry of the ledger, and an activation or a release that one may have begun."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ class Entry:
 
 
 class Begun(NamedTuple):
-    """An activation that a write of ours has begun, or may have: stopping the hand takes it back.
+    """An activation or a release that a write of ours has begun, or may have: stopping the hand ends it.
 
-    A write begins one that was not asked for if another client resets the gripper just before it: then
-    its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
+    A write begins an activation that nobody asked for if another client resets the gripper just before it:
+    then its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
     """
 
     entry: Entry

@@ -37,7 +37,7 @@ from itertools import takewhile
 from typing import Final
 
 from ..runtime.logger import Log, log
-from ..values.enums import NO_AXES, Finger, Trigger
+from ..values.enums import NO_AXES, Fault, Finger, Trigger
 from ..values.registers import Echo
 from ..values.request import Request
 from ..values.status import RobotiqStatus
@@ -79,8 +79,8 @@ class Ledger:
         self.requests: Final = RecentRequests(first.model)
         self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
-        # One that ours have begun; stopping the hand takes it back.
-        self.activation: Begun | None = None if before is None else before.activation
+        # The activation or the release that ours have begun.
+        self.begun: Begun | None = None if before is None else before.begun
         self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
         self._delay = 0.0  # seconds from sending to acting, at least, of the newest write that showed
 
@@ -211,7 +211,7 @@ class Ledger:
     # -- what is written -------------------------------------------------------------------------------
 
     def write(
-        self, image: Request, axes: Finger, now: float, *, activates: bool = False, is_early: bool = False
+        self, image: Request, axes: Finger, now: float, *, begins: bool = False, is_early: bool = False
     ) -> Entry:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
@@ -224,8 +224,8 @@ class Ledger:
         self.requests.ask(entry, before, is_at_rest=before.image.go)
         self.ours |= axes
         self.ahead = (*self.ahead, entry)
-        if activates:
-            self.activation = Begun(entry)
+        if begins:
+            self.begun = Begun(entry)
         return entry
 
     def acknowledge(self, now: float) -> None:
@@ -267,8 +267,8 @@ class Ledger:
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
             self._adoption = self._adoption._replace(latest=status, now=self.now)
-        if self.activation is not None and _ends_activation(status) and self.acts(self.activation.entry):
-            self.activation = None
+        if self.begun is not None and self._has_ended(self.begun.entry, status):
+            self.begun = None
         if is_ready and self.match is not None:
             self.update_rest(status)
 
@@ -325,14 +325,24 @@ class Ledger:
         self._past.extend([each for each in self.ahead[:count] if not each.is_doubtful])
         self.ahead = self.ahead[count:]
 
+    def _has_ended(self, begun: Entry, status: RobotiqStatus) -> bool:
+        """Whether the activation or the release of an entry is over. A status may be from before it."""
+        condition = classify(status)
+        if not begun.image.release:
+            # A fault does not end it: the fingers may go on as that clears [conceivable].
+            return (status.is_activated or condition is Trigger.SEEN_RESET) and self.acts(begun)
+        if status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE:
+            return condition in (Trigger.SEEN_RESET, Trigger.SEEN_RELEASED) and self.acts(begun)
+        return self._is_over(begun)  # it never began, or another client has activated the gripper
+
     def sees_stray(self, status: RobotiqStatus) -> bool:
         """Whether a status shows an activation that our rACT has begun unasked, and that moves an axis."""
-        if self.activation is None and is_activating(status):
+        if self.begun is None and is_activating(status):
             # A write with rACT begins to act only in this status, or has a short time before it.
             ours = (each for each in (*self._past, *self.ahead) if each.is_ours and each.echo == status.echo)
             if any(each.image.activate and self._age(each) < WINDOW_S for each in ours):
-                self.activation = Begun(self.last, status)
-        return self.activation is not None and self.activation.is_stray(status)
+                self.begun = Begun(self.last, status)
+        return self.begun is not None and self.begun.is_stray(status)
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Make the image that a status shows the only certain entry; those ahead may act after it."""
@@ -381,8 +391,3 @@ class Ledger:
             if contacts & self.requests.unrested:
                 contacts &= ~self.requests.may_move(status, self.now)
             self.contacts.see(status, contacts)
-
-
-def _ends_activation(status: RobotiqStatus) -> bool:
-    # A fault does not end it: the fingers may go on as that clears [conceivable].
-    return status.is_activated or classify(status) is Trigger.SEEN_RESET

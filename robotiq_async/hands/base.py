@@ -112,6 +112,9 @@ class Hand(HandKind):
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
+        rGTO does not end an activation or a release: one that this hand has begun is ended by a reset (rACT =
+        0), and the part is let go. Those of other clients, and an emergency release, continue.
+
         The stop is final from the call on: every request is refused with NotStartedError, requests that were
         not sent are dropped, and every other wait ends with NotStartedError. Nothing
         that starts or continues a motion is sent after the call. The state is SHUTDOWN when it returns.
@@ -437,7 +440,7 @@ class Hand(HandKind):
         """Release automatically: all axes open slowly, in any fault. Only in FAULT.
 
         Returns in ATR_DONE. After that only :meth:`reset` and :meth:`activate`, or :meth:`recover`, help.
-        When cancelled, the release continues.
+        When cancelled, the release continues. :meth:`halt`, :meth:`reset` and :meth:`stop` end it.
 
         Raises:
             InvalidStateError: not in FAULT.

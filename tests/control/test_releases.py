@@ -1,4 +1,4 @@
-"""Automatic releases that another client ends."""
+"""Automatic releases that another client ends, or a stop."""
 
 from __future__ import annotations
 
@@ -108,3 +108,70 @@ def test_a_release_that_is_called_off_leaves_the_hand_where_the_gripper_is(scan:
     scan.run(1.0)
     assert len(scan.written) == written
     assert scan.state is State.FAULT
+
+
+def stands(scan: Scan) -> bool:
+    before = scan.travels()
+    scan.now += 10
+    return scan.travels() == before
+
+
+@pytest.mark.parametrize("keep_grip", [False, True])
+def test_a_stop_ends_our_release_by_a_reset(releasing: Scan, keep_grip: bool) -> None:
+    """The fingers opened for seconds after stop() had returned."""
+    releasing.stop(keep_grip=keep_grip)
+    assert releasing.status().is_reset
+    assert stands(releasing)
+
+
+def test_a_stop_ends_a_release_that_has_just_been_written(scan: Scan) -> None:
+    scan.moved(200)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    scan.step()
+    assert scan.latest.fault is Fault.SCISSOR_BLOCKED, "it does not show"
+    scan.stop()
+    assert stands(scan)
+
+
+def test_a_stop_of_the_next_session_ends_it_too(releasing: Scan) -> None:
+    later = Scan(after=releasing, goes_on=True)
+    later.connect(activate=False)
+    later.stop()
+    assert stands(later)
+
+
+def test_a_stop_leaves_the_release_of_another_client_alone(scan: Scan) -> None:
+    scan.moved(200)
+    scan.gripper.write(0, [0x1900])
+    scan.until(lambda: scan.latest.fault is Fault.AUTOMATIC_RELEASE)
+    scan.stop()
+    assert scan.last_image.activate
+    assert not stands(scan)
+
+
+def test_a_stop_after_our_release_resets_nothing(releasing: Scan) -> None:
+    releasing.until(lambda: releasing.state is State.ATR_DONE, 60)
+    releasing.stop()
+    assert releasing.status().activation_echo
+
+
+def test_a_stop_after_a_release_that_the_gripper_forgot_resets_nothing(scan: Scan) -> None:
+    scan.gripper.inject_fault(Fault.SCISSOR_INTERFERENCE, 0.2)
+    scan.step()
+    scan.forgets = 1
+    scan.controller.release()
+    scan.run(1.5)
+    scan.stop()
+    assert scan.status().is_activated
+
+
+def test_a_stop_leaves_the_activation_alone_by_which_another_client_has_ended_our_release(
+    releasing: Scan,
+) -> None:
+    reset_and_activated_unseen(releasing, 1.0)
+    releasing.run(0.1)
+    assert releasing.state is State.WF_ACTIVATION
+    releasing.stop()
+    assert releasing.status().activation_echo
