@@ -71,8 +71,7 @@ class Controller:
         self.activates: bool = False  # whether a gripper that is found reset is activated
         self.foreign_commands: int = 0  # how often another client was seen to command the gripper
         self.ledger: Final = Ledger(first, machine.log, before)
-        # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
-        # forget it. A stop does not wait; it is repeated.
+        # Seconds from sending a write to the next one. A stop does not wait for them; it is repeated.
         self._spacing: Final = write_spacing
         self._ended: Final = ended
         self.evidence: Final = Evidence(machine.log)

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from ..values.enums import NO_AXES, Finger
 from ..values.registers import Echo
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-
-STRAY_COUNTS: Final = 10
-"""An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
-for less: 10 counts take 0.09 s [thesis]."""
 
 
 @dataclass(slots=True, eq=False)
@@ -68,10 +64,3 @@ class Begun(NamedTuple):
 
     entry: Entry
     first: RobotiqStatus | None = None  # the first status of one that was not asked for
-
-    def is_stray(self, status: RobotiqStatus) -> bool:
-        """Whether it was not asked for, and moves an axis."""
-        if self.first is None:
-            return False
-        pairs = ((status.position(axis), self.first.position(axis)) for axis in status.model.axes)
-        return max(abs(now - then) for now, then in pairs) > STRAY_COUNTS

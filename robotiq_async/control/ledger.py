@@ -53,6 +53,9 @@ WINDOW_S: Final = 0.5
 SILENT_S: Final = 0.25
 """Time in which a write acts where no echo shows it (speed, force; one that was lost with the link): the
 slowest device cycle and 0.05 s."""
+STRAY_COUNTS: Final = 10
+"""An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
+for less: 10 counts take 0.09 s [thesis]."""
 NEVER: Final = float("-inf")
 
 
@@ -342,7 +345,10 @@ class Ledger:
             ours = (each for each in (*self._past, *self.ahead) if each.is_ours and each.echo == status.echo)
             if any(each.image.activate and self._age(each) < WINDOW_S for each in ours):
                 self.begun = Begun(self.last, status)
-        return self.begun is not None and self.begun.is_stray(status)
+        if self.begun is None or (first := self.begun.first) is None:
+            return False
+        axes = status.model.axes
+        return max(abs(status.position(axis) - first.position(axis)) for axis in axes) > STRAY_COUNTS
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Make the image that a status shows the only certain entry; those ahead may act after it."""

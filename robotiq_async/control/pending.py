@@ -218,11 +218,7 @@ class OpenRequests:
         return is_open, Finger(sum(axes))
 
     def drop(self, *, holds: bool) -> list[Waiter[Any]]:
-        """Drop all that would move an axis, sent or not, and with ``holds`` what callers have asked to stop.
-
-        Returns:
-            The callers that wait for it.
-        """
+        """Drop all that would move an axis, with ``holds`` also what is to stop one; return the callers."""
         # A write may be on the line all the same. Holds of our own making go in any case.
         calls = [call for call in self.calls if holds or not (call.held or call.halts)]
         dropped = self._close([*calls, *self.moves])

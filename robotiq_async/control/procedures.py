@@ -36,8 +36,8 @@ class Procedure(Duty):
     def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:
         self.releases = begin is automatic_release
         self.activates = not self.releases
-        release, activation = (State.DO_ATR, State.WF_ATR), (State.DO_ACTIVATION, State.WF_ACTIVATION)
-        super().__init__(release if self.releases else activation)
+        of_release, of_activation = (State.DO_ATR, State.WF_ATR), (State.DO_ACTIVATION, State.WF_ACTIVATION)
+        super().__init__(of_release if self.releases else of_activation)
         self._steps: Final = begin(lambda status: at_rest(ledger.base, status))
         next(self._steps)  # to its first yield: what the gripper shows decides whether it begins
 
