@@ -83,7 +83,7 @@ async def stop_reading(here: Bench) -> str:
     await hand.start()
     await other_moves(here)
     await hand.stop()
-    return "fingers go on" if here.gripper.is_moving else "fingers stop"
+    return "fingers keep moving" if here.gripper.is_moving else "fingers stop"
 
 
 async def other_moves(here: Bench) -> None:
@@ -103,13 +103,13 @@ async def second_halt(here: Bench) -> str:
         except RobotiqError:
             moving.cancel()
             await ended(moving)
-            return "cannot be asked"
+            return "impossible"
         await second.halt()
         assert not here.gripper.is_moving
         await second.stop()
         assert type(await ended(moving)).__name__ == "ControlLostError"
         assert await outcome(hand.set_speed(3), "done") == "ControlLostError"
-        return "stops, and the first has lost control"
+        return "stops, and the first hand has lost control"
 
 
 async def after_stop(here: Bench) -> str:
