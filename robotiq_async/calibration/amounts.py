@@ -14,13 +14,13 @@ from ..values.enums import Finger
 from .units import Units
 
 OPENINGS: Final = ("mm", "open_fraction")
-"""The arguments of calls that stand in the place of a position."""
+"""The arguments of calls that replace a position."""
 RATES: Final = ("mm_per_s",)
-"""Those that stand in the place of a speed."""
+"""The arguments that replace a speed."""
 LABELS: Final = ("label_n",)
-"""Those that stand in the place of a force."""
+"""The arguments that replace a force."""
 UNITS: Final = frozenset((*OPENINGS, *RATES, *LABELS))
-"""All arguments that are no counts: they become counts in this process, and an agent refuses them."""
+"""All arguments in other units: this process converts them to counts, and an agent refuses them."""
 
 
 def position_of(

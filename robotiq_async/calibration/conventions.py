@@ -18,16 +18,17 @@ class Convention:
         hand.command(open_fraction=Convention.DROID.fraction(action))
         state = Convention.DROID.value(status.open_fraction(JAW))
 
-    Yours is ``Convention("bench", open=0.0, closed=5.0)``. No convention measures an opening: the metres of
-    POLYMETIS_2F85 are linear in counts, and up to 2.8 mm off the arc of the linkage.
+    For another stack: ``Convention("bench", open=0.0, closed=5.0)``. No convention measures an opening: the
+    metres of POLYMETIS_2F85 are linear in counts, and up to 2.8 mm off the arc of the linkage.
 
     Attributes:
         name: for messages and tables.
         open: the number of an open gripper.
-        closed: the number of a closed one, which presses.
+        closed: the number of a closed gripper, which presses.
 
     Raises:
-        TypeError, ValueError: no text; no number, or one beyond 1e9; two equal numbers.
+        TypeError: ``name`` is not a text, or another argument is not a number.
+        ValueError: a number beyond 1e9, or two equal numbers.
     """
 
     name: str

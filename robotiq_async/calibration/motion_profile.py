@@ -27,7 +27,7 @@ PRESSING_S: Final = 0.05
 
 GOES_ON_S: Final = 0.2
 """Seconds of rest within which an axis that continues in the same direction needs no start: an assumption.
-The recorded motions were strokes to and fro, and none tells about a stream of small steps."""
+The recorded motions were strokes to and fro, and none was a stream of small steps."""
 
 # One 2F-85 read 225 closed at force 0 and speed 0, 226 at higher speeds and at force 30, another one 228 at
 # 64, and 230 from 80 on.
@@ -52,9 +52,8 @@ class MotionProfile:
         start_closing_s: seconds from a request at rest to the first motion, if it closes.
         start_opening_s: the same if it opens.
         landing: counts before an end stop that it travels at the slowest rate.
-        pressing: counts; for the time of so many it presses before a contact, or the closed stop, is
-            reported.
-        pressing_s: seconds for which it presses besides.
+        pressing: it presses for the time of this many counts before it reports a contact or the closed stop.
+        pressing_s: seconds that it presses in addition.
         overrun: counts by which a contact at full speed reads further than a slow one.
         give: counts by which the greatest force presses the closed stop further than the least.
     """

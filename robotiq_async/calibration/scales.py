@@ -42,8 +42,8 @@ class SpeedCalibration:
         source: of the figures, for people.
         points: rising speed values, each with the seconds of a full closing.
         model: of the gripper; None where it is not known. Hands of another model refuse it.
-        profile: the motion behind the figures, which tells the way from its start and end; None for closing
-            times alone.
+        profile: the motion behind the figures, which separates the way from its start and end; None for
+            closing times alone.
     """
 
     source: str

@@ -67,7 +67,7 @@ class Amount(NamedTuple):
 
 
 def _amount(name: str, *units: str, metavar: str | None = None) -> Parameter:
-    """A parameter of counts, or of a number with one of these units; the hand knows the range of that."""
+    """A parameter of counts, or of a number with one of these units, whose range the hand checks."""
     integer = _integer(name, 0, 255)
     form = re.compile(rf"([0-9]{{1,6}}(?:\.[0-9]{{1,6}})?) ?({'|'.join(map(re.escape, units))})")
 

@@ -84,5 +84,5 @@ def with_arguments(text: str, names: Iterable[str], same: Mapping[str, str]) -> 
 
 
 def with_arguments_of(text: str, other: str) -> str:
-    """The docstring of a class that is made as another: with that one's sections."""
+    """A docstring with the sections of the original, for a class that is made with the same arguments."""
     return f"{inspect.cleandoc(text)}\n\n{SECTIONS}{inspect.cleandoc(other).partition(SECTIONS)[2]}"

@@ -335,7 +335,7 @@ class Hand(HandKind):
         pending requests of these axes end with MoveSupersededError; their other axes keep moving. When
         cancelled, the hold is still sent. If a lost link prevents the acknowledgement, the hold is
         repeated once the link is back, unless another client moves the axes then. In RESET and ATR_DONE, and
-        during an activation, a release or a reset, it sends nothing; :meth:`halt` ends those.
+        during an activation, a release or a reset, it sends nothing; :meth:`halt` ends these.
 
         A hold needs to know the gripper's request, so it may wait: for ``write_spacing``, and up to 0.25 s
         after a write of another client or a lost acknowledgement. :meth:`halt` waits for nothing.

@@ -95,7 +95,7 @@ class Intake(Generic[T]):
         self._loop: asyncio.AbstractEventLoop | None = None
         """The loop of the hand, while it runs: items come from there."""
         self._kept: Final = kept
-        """Those with a waiting reader: strong references, because nothing else may hold the reader's task."""
+        """Intakes with a waiting reader: strong references, as nothing else may hold the reader's task."""
         self._items: Final[deque[T]] = deque(maxlen=buffer)
         self._waiting: asyncio.Future[None] | None = None
         self._ended = False

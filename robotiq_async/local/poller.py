@@ -271,7 +271,7 @@ class Poller:
     async def _check_who_answers(self, registers: Registers) -> None:
         """Refuse another gripper, and a device that is no gripper.
 
-        Reserved bits alone do not tell that a gripper is another one than before. It may be in motion, so it
+        Reserved bits alone do not prove that this is another gripper than before. It may be in motion, so it
         must get its stop.
         """
         if shown := self._model.contradiction(registers):

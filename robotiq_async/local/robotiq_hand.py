@@ -317,7 +317,7 @@ class RobotiqHand(Hand):
         """Say which speeds and forces the gripper has at the next start: the status does not echo them.
 
         Args:
-            settings: counts by axis, and "speed" or "force". Those left out are the ones of the options.
+            settings: counts by axis, and "speed" or "force". The options give the values that are left out.
         """
         self._assumed = dict(settings)
 

@@ -86,7 +86,7 @@ def write_all(descriptor: int, data: bytes) -> None:
 
 
 def green_threads() -> str:
-    """The library that has replaced Python's threads, gevent or eventlet; empty if none has.
+    """The library that has replaced Python's threads, gevent or eventlet; empty without one.
 
     A thread is then a part of the thread that starts it: an event loop in it would not run while that waits.
     """

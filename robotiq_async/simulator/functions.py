@@ -12,4 +12,4 @@ READ_WRITE: Final = 23
 TCP_FUNCTIONS: Final = frozenset({READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE})
 """The Modbus functions that are served over TCP."""
 RTU_FUNCTIONS: Final = TCP_FUNCTIONS | {READ_WRITE}
-"""Those on a serial line. The manual has function 23 there, as an example (2014, p. 64; 2018, p. 46)."""
+"""The functions on a serial line. The manual has 23 there, as an example (2014, p. 64; 2018, p. 46)."""

@@ -26,7 +26,7 @@ class _SignalError(BaseException):
 
 @contextmanager
 def stops_on_signals(*hands: RobotiqHand) -> Iterator[None]:
-    """Stop blocking hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
+    """Stop blocking hands on SIGINT, SIGTERM and SIGHUP, and then leave the block.
 
     Without it SIGTERM ends a program at once, and the fingers keep moving; and the first process of a
     container (PID 1) does not get SIGTERM at all. The stops run in the thread of the hands, also in a busy

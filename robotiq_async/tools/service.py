@@ -48,7 +48,7 @@ class Health:
         fault: the gripper's fault in the newest status.
         holds: the fingers that hold a part by the newest status, as its ``part`` says.
         problem: the reason why the hand takes no motion commands now, in a sentence; empty if it does.
-        inhibited: why a person has it refuse motion; None if none has.
+        inhibited: the reason of a person for which it refuses motion, or None.
     """
 
     name: str
@@ -143,7 +143,7 @@ class Signals:
 
 @asynccontextmanager
 async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator[Signals]:
-    """Stop hands on SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK, and leave the block after that.
+    """Stop hands on SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK, and then leave the block.
 
     All stops begin at once, in the next turn of the event loop. When they have ended, the
     block is cancelled, and the program continues after it. The NotStartedError of a call that a stop has

@@ -69,7 +69,7 @@ _FAULTY: Final[Row] = _AS_SEEN | _all(_STARTING, Verdict.IN_FAULT)
 
 
 def _row(entries: Row) -> Row:
-    """The entries that are usual while the link is up, replaced by those given."""
+    """The usual entries while the link is up, with ``entries`` instead of some."""
     return {
         **{trigger: Verdict.IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger},
         # In a sequence no axis moves by a command, and only rACT = 0 ends it.

@@ -44,7 +44,7 @@ class RobotiqStatus:
     Attributes:
         registers: the eight registers as they came.
         timestamp: monotonic seconds at which the reply was taken in. The gripper gave it at most one exchange
-            earlier. If something held up the event loop in that time, it was waiting, and is older by that.
+            earlier. If the event loop was held up meanwhile, the reply waited, and is older by that time.
         sequence: counts every poll of a hand, from 0.
         model: of the gripper.
         stroke: openings by position; by default the model's.
@@ -318,7 +318,7 @@ class RobotiqStatus:
 
     @property
     def moving(self) -> Finger:
-        """The axes that move (empty when none does)."""
+        """The axes that move; may be empty."""
         model = self._model
         shown = self._registers[0] >> model.object_shift & 0xFF
         return model.moving[shown] if self._is_under_request else Finger(0)
@@ -334,7 +334,7 @@ class RobotiqStatus:
 
     @property
     def contacts(self) -> Finger:
-        """The axes stopped by a contact (empty when none is)."""
+        """The axes stopped by a contact; may be empty."""
         model = self._model
         return model.contacts[self._registers[0] >> model.object_shift & 0xFF]
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..agent_file import AgentSettings
 
 WAITING_S = 2.0
-"""Seconds until it reports that it waits for a router; else opening a session takes a tenth of that."""
+"""Seconds until it reports that it waits for a router; usually a session opens in a tenth of this time."""
 
 
 async def agent(

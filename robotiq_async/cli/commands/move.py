@@ -55,7 +55,7 @@ def move(
     success, and is in the table. Unless the gripper is simulated it asks
     first; without a terminal it needs --yes.
 
-    At the end it stops every axis (rGTO = 0), also those that hold something. According
+    At the end it stops every axis (rGTO = 0), also axes that hold something. According
     to the vendor the part stays held then; that is not measured on a 3-Finger. The next
     move does not resume that grip. With --keep rGTO stays set if everything has come to
     rest, also after Ctrl-C, and the next move leaves the other axes their grip. Speed and

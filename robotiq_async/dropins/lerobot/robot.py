@@ -6,8 +6,8 @@ LeRobot finds the type by the distribution ``lerobot_robot_robotiq``, or without
 ``--robot.discover_packages_path=robotiq_async.dropins.lerobot``.
 
 It has two action dimensions, position and force. LeRobot keeps an action of one dimension as a number without
-an axis: its ``lerobot-replay`` indexes that, and fails. The price is that a leader has to give both, and most
-give a position alone: ``action_force`` is for those.
+an axis: its ``lerobot-replay`` indexes that number, and fails. The price: a leader has to give both. For the
+many leaders that give a position alone, ``action_force`` is the force.
 """
 
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Fingers: the axes that a client has set in motion, and those to hold when no client is there for them."""
+"""Fingers: the axes that a client has set in motion, and the axes to hold because no client is there."""
 
 from __future__ import annotations
 

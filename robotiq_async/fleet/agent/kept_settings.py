@@ -116,7 +116,7 @@ class KeptSettings:
 
     @property
     def in_gripper(self) -> Mapping[Setting, int]:
-        """Those that the gripper has, as far as it is known."""
+        """The settings that the gripper has, as far as they are known."""
         return self._gripper
 
     @property

@@ -1,12 +1,12 @@
 """Records: who may reacquire the lease automatically, and inhibits, kept over a restart of the agent.
 
 A person halts the gripper, then the agent is killed and restarted. The client that commanded before, and did
-not receive that halt, reacquires the lease automatically; the new run of the agent must refuse it, and needs
-the record for that. Without a record no client may reacquire automatically.
+not receive that halt, reacquires the lease automatically; the new run of the agent must refuse this, and
+needs the record to know. Without a record no client may reacquire automatically.
 
 An inhibit that a person has set counts until a person lifts it, so its record counts after a restart of the
-machine, too: an outdated one can only refuse motion. It is on the disk before the file of before is replaced.
-If it cannot be written, an empty file takes its place: one that cannot be read counts as an inhibit.
+machine, too: an outdated inhibit can only refuse motion. The new file is on the disk before it replaces the
+old file. If it cannot be written, an empty file takes its place: an unreadable record counts as an inhibit.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
 QUEUED: Final = 16  # halts, and commands, that may wait in a link until its thread runs; zenoh's default is 2
 UNKNOWN: Final = 1000
 """Connections that have not identified themselves; at the limit, by default 100, zenoh accepts no others."""
-UNKNOWN_MS: Final = 5000  # time in ms after which those are closed; zenoh's default is 10 s
+UNKNOWN_MS: Final = 5000  # time in ms after which such connections are closed; zenoh's default is 10 s
 LINK_LEASE_MS: Final = 1000
 """Time in ms after which a frozen or unplugged peer is detected; zenoh's default is 10 s."""
 
@@ -55,7 +55,7 @@ def agent_configuration(
 def check_trust(
     trusts_router: object, listen: Sequence[str], connect: Sequence[str], *, has_keys: bool
 ) -> bool:
-    """Check that there is a router to trust, and no way past it: TypeError or ValueError if not."""
+    """Check that there is a router to trust, and no way around it. Raises TypeError or ValueError."""
     if not isinstance(trusts_router, bool):
         raise TypeError(f"trusts_router must be true or false, got {trusts_router!r}")
     if trusts_router and not (has_keys and connect and not listen):

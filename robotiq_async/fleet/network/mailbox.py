@@ -46,7 +46,7 @@ class Mailbox:
 
     Waking the loop costs more than handling a status. Under load, with telemetry from dozens of hands, the
     loop is woken once for all that arrives within a millisecond. Requests, answers and the telemetry of a
-    single hand never wait for that.
+    single hand never wait for this millisecond.
     """
 
     def __init__(self) -> None:
@@ -77,8 +77,8 @@ class Mailbox:
         if not self.has_room(kind):
             return False
         self._queues.get(kind, self._deliveries).append(delivery)
-        # Telemetry, and the kinds that come last, wait for a timer that is already set. Anything else wakes
-        # the loop before that.
+        # Telemetry, and the kinds that come last, wait for a timer that is already set. Any other kind wakes
+        # the loop earlier.
         waits = kind is MessageKind.TELEMETRY or kind in self._last
         if not self._is_due or (not waits and self._gathering is not None):
             self._is_due = True
@@ -138,7 +138,7 @@ class ReplySender:
         self._thread: threading.Thread | None = None
 
     def put(self, send: Callable[[], None], drop: Callable[[], None]) -> None:
-        """Send a reply after those before it, or drop its query if too many wait."""
+        """Send a reply after the earlier replies, or drop its query if too many wait."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="robotiq_async fleet", daemon=True)
             self._thread.start()

@@ -357,7 +357,7 @@ class Dialog:
             self._send(errand)
 
     def _resend_all_soon(self) -> None:
-        # A command was lost, and the agent refuses those after it: repeat all, in their order.
+        # A command was lost, and the agent refuses later commands: repeat all, in their order.
         if self._resending is None:
             self._resending = self.loop.call_later(EARLY_S, self._resend_all)
 

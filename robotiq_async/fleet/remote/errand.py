@@ -116,9 +116,9 @@ class Errand:
         self._name = name
         self._agents = agents
         self._resend, self._came_early = resend, came_early
-        self._confirmed: set[int] = set()  # the runs of agents that have
+        self._confirmed: set[int] = set()  # the runs of agents that have confirmed a halt
         self._newest: BusReply | None = None
-        self._said: AgentAnswer | RobotiqError | None = None  # by that
+        self._said: AgentAnswer | RobotiqError | None = None  # the content of the newest reply
         self._in_doubt: AgentAnswer | RobotiqError | None = None
         """The outcome when the time is over."""
         self.carries: dict[Setting, int] = asked_of(verb.removeprefix("cmd/"), call.arguments)
@@ -140,7 +140,7 @@ class Errand:
 
     @property
     def is_command(self) -> bool:
-        # Commands keep their order. A cancellation does not wait for those before it.
+        # Commands keep their order. A cancellation does not wait for earlier commands.
         return self.verb.startswith("cmd/") and self.verb != "cmd/cancel"
 
     @property
@@ -177,7 +177,7 @@ class Errand:
     # -- replies ---------------------------------------------------------------------------------------
 
     def decides(self, reply: BusReply) -> bool:
-        """Whether a reply ends the wait for the others to its copy."""
+        """Whether a reply ends the wait for further replies to the same copy of the request."""
         said = self._say(reply)
         if not self.is_halt:
             return _is_of_its_run(self.call, said)

@@ -201,7 +201,7 @@ class Mirror:
         return False
 
     def skip_events(self, index: int) -> None:
-        # The agent no longer has those up to this one.
+        # The agent no longer has the events up to this one.
         self.events = max(self.events, index)
 
     def has_missed(self) -> bool:

@@ -92,7 +92,7 @@ class RemoteSession:
         channels.reopen(self.dialog.loop)
         self.mirror.begin(now())
         self._unreadable = LimitedLog(self.mirror.log)
-        # One wildcard, not a subscription for each key: with those, zenoh has delivered samples under wrong
+        # One wildcard, not a subscription for each key, with which zenoh has delivered samples under wrong
         # keys (docs/decisions/fleet.md). So every payload identifies its gripper, too.
         self._undo: Undo = bus.subscribe(name.key("*"), self._receive)
 

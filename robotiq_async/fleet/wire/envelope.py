@@ -132,7 +132,7 @@ _WORDS: Final = {False: "; nothing was done", None: "; it may have been carried 
 
 
 def failure(call: AgentCall, epoch: int, error: Exception, begun: bool | None) -> AgentAnswer:
-    """The answer with an error, which says whether the request was carried out. No other place says that."""
+    """The answer with an error, and with the only statement whether the request was carried out."""
     fields = error_fields(error)
     if isinstance(error, AgentError | ControlLostError):
         fields["message"] += _WORDS[begun]

@@ -60,7 +60,7 @@ _ATTRIBUTES: Final = {
     "ControlLostError": ("reason",),
     "MotionInhibitedError": ("reason", "who", "since"),
 }
-"""Those that each kind of error has beside its message."""
+"""The attributes of each kind of error, in addition to its message."""
 _WRITTEN: Final[Mapping[str, Callable[[Any], object]]] = {
     "state": lambda state: state.name,
     "allowed": lambda states: sorted(each.name for each in states),

@@ -103,7 +103,7 @@ class GripperConnection:
         return True
 
     def refuse(self, reason: str) -> None:
-        """Refuse commands from now on, and end those that run: :meth:`close` follows."""
+        """Refuse commands from now on, and end the running commands: :meth:`close` follows."""
         self.takes_commands, self._is_closed = False, True
         self._end_all(reason)
 

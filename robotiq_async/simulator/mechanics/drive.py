@@ -60,7 +60,7 @@ class MotorDrive:
         position: of the axis.
         travel: the distance that it has travelled.
         outcome: of the last goal.
-        clears: parts are out of the way until it has opened, or has another order.
+        clears: whether parts are out of the way, until it has opened or has another order.
     """
 
     def __init__(

@@ -114,12 +114,12 @@ class Mechanism(Protocol):
         """Let its thread move it."""
 
     def stop(self) -> None:
-        """End its thread, and wait for that."""
+        """End its thread, and wait until it has ended."""
 
     def drive(self, axis: Finger) -> Drive: ...
 
     def step(self, until: float) -> bool:
-        """Make one step if that does not lead beyond a time, in simulated seconds; return whether it did.
+        """Make one step if it ends by a time, in simulated seconds; return whether a step was made.
 
         Raises:
             PhysicsError: it cannot move any more.

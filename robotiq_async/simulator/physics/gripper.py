@@ -255,7 +255,7 @@ class SimulatedGripper:
     def remove_object(self, fingers: Finger | int = Finger.ALL) -> None:
         """Remove the obstacles of some axes.
 
-        Those it has stopped stay in their contact until a position on the other side is requested, the force
+        Axes that they have stopped stay in contact until a position on the other side is requested, the force
         is raised or rGTO goes from 0 to 1 (manual 2014, p. 51).
 
         Raises:
@@ -319,7 +319,7 @@ class SimulatedGripper:
         """Press the emergency stop: an active gripper stops, reports fault 0x05, and stays at gIMC = 1.
 
         Args:
-            resets: number of resets needed after :meth:`end_emergency_stop`; before it none helps.
+            resets: number of resets needed after :meth:`end_emergency_stop`; an earlier reset does not count.
 
         Raises:
             TypeError: resets is not an int.

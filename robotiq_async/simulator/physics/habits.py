@@ -40,10 +40,10 @@ class Habits:
             otherwise gDT and gSTA are 0 then. The manual says that their 0 means nothing while gGTO = 0.
         opens_without_rics: clearing rICS is a mode change: it opens the fingers, rGTO or not, and drops the
             part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source settles it.
-        answers_with_echo: the reply to function 23 reflects the request that came with it. By the 2F's manual
-            the gripper executes the command, and one cycle of motion, before it answers; the vendor's own
-            loop lives on that. Otherwise it has the state before, as a read soon after a write does. No
-            source covers a 3-Finger.
+        answers_with_echo: the reply to function 23 reflects the request that came with it. The 2F's manual
+            says that the gripper executes the command, and one cycle of motion, before it answers; the
+            vendor's loop relies on that. Otherwise the reply has the state before, like a read soon after a
+            write. No source covers a 3-Finger.
     """
 
     activation_time: float = QUICK_ACTIVATION

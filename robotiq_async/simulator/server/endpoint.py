@@ -66,7 +66,7 @@ class SimulatorEndpoint(ABC):
 
     @property
     def connections(self) -> Sequence[Connection]:
-        """Those to the clients that are there, oldest first."""
+        """The open connections, oldest first."""
         return cast("Sequence[Connection]", tuple(self._responder.clients))
 
     @property

@@ -3,7 +3,7 @@
 # Theory of operation
 #
 # A pseudo terminal or a socket carries bytes at once; a line at 115200 baud does not. SerialConnection delays
-# them in both directions, each byte behind those before it, by the times of WireTime:
+# them in both directions, each byte behind the bytes before it, by the times of WireTime:
 #
 #   in    data_received -> time of the last byte and the silence after it -> _hear -> a request is answered
 #   out   pass_on -> time of the last byte at the client -> _put
@@ -260,8 +260,8 @@ class SerialSimulatorServer(_RtuEndpoint):
     async def _open(self) -> None:
         loop, line = asyncio.get_running_loop(), {"bytesize": 8, "parity": "N", "stopbits": 1}
         await create_serial_connection(loop, self._connection, self._port, baudrate=BAUD, **line)
-        # The transport watches the line from the next turn of the loop on and calls the connection in the
-        # one after that; closing it earlier would fail.
+        # The transport watches the line from the next turn of the loop on and calls the connection one turn
+        # later; closing it earlier would fail.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
 
@@ -329,7 +329,7 @@ class WireTime:
         return (self._heard_until - now) / BYTE_S
 
     def unsent(self, now: float) -> float:
-        """Bytes that are still on their way from it."""
+        """Bytes that are still on their way from the gripper."""
         return (self._sent_until - now) / BYTE_S
 
     def hears(self, now: float, size: int) -> tuple[float, float]:

@@ -11,7 +11,7 @@ Six channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every requ
 ``/gripper/event`` (transitions, faults and marks) as JSON with a JSON Schema; ``/joint_states``,
 ``/robot_description`` and ``/tf`` as ROS 2 encodes them. Tools of ROS 2 refuse a file with other channels
 than ROS's: ``ros2=True`` writes joint states alone. A table has a row for every poll, and no commands. A
-thread writes to the disk twice a second. A killed program loses no more than that, and
+thread writes to the disk twice a second. A killed program loses at most the last half second, and
 ``robotiq-async recover`` repairs its file.
 """
 

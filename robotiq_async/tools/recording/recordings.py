@@ -176,8 +176,8 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
     """Copy the readable part of a truncated recording into a complete one.
 
     Raises:
-        RecordingError: as :func:`read_recording`, with the messages before in the target; or the target
-            exists already.
+        RecordingError: as :func:`read_recording`; the target then has the messages before the damage. Also if
+            the target exists already.
     """
     messages, is_whole = 0, False
     records = _records(path)

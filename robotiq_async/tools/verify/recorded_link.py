@@ -26,7 +26,7 @@ class RecordedExchange:
     began: float  # the loop's time of sending
     ended: float  # when the answer came, or the failure
     kind: str  # "status", "command", "failure", or "probe" for a read in another place
-    registers: Registers = ()  # those read or written; empty for a probe and for a failure of a read
+    registers: Registers = ()  # the registers read or written; empty for a probe and for a failed read
     words: str = ""  # the failure, or the finding of a probe
 
 

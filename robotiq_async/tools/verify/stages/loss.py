@@ -36,7 +36,7 @@ RESET_AGAIN: Final = (
 
 
 async def loss(bench: Bench) -> None:
-    """Check one after the other; the person may skip those done by hand."""
+    """Check one loss after the other; the person may skip losses made by hand."""
     await _client(bench)
     await _alone(bench)
     for words, name, part in (

@@ -18,7 +18,7 @@ WRITE_STILL_S: Final = 1.0
 WRITE_PROBES: Final = 20
 ECHO_S: Final = 0.02
 LONGEST_ECHO_S: Final = 1.0
-APART_S: Final = 0.1  # between two probes, so that none is forgotten
+APART_S: Final = 0.1  # between two probes, so that no probe is forgotten
 GAPS_S: Final = (0.002, 0.005, 0.011, 0.021)
 """Seconds between two writes; 1 ms more than the time in question where an early timer would decide."""
 PAIRS: Final = 5
