@@ -153,6 +153,12 @@ class Heard:
         return "\n".join(map(str, said[-MOST_TOLD:]))
 
 
+def readable(frame: bytes) -> str:
+    """The words of a text port, or the bytes of Modbus."""
+    words = frame.decode("latin-1").strip()
+    return words if words.isascii() and words.isprintable() else frame.hex(" ")
+
+
 class Said(NamedTuple):
     """A request that came in, or a reply and the parts of it that were sent; None if the line was cut."""
 
@@ -162,10 +168,10 @@ class Said(NamedTuple):
     is_reply: bool = False
 
     def __str__(self) -> str:
-        text = f"{self.time:.4f} {'reply' if self.is_reply else 'asked'} {self.frame.hex(' ')}"
+        text = f"{self.time:.4f} {'reply' if self.is_reply else 'asked'} {readable(self.frame)}"
         if not self.is_reply or self.parts == ((0.0, self.frame),):
             return text
-        parts = [f"{part.hex(' ')} after {delay:g} s" for delay, part in self.parts or ()]
+        parts = [f"{readable(part)} after {delay:g} s" for delay, part in self.parts or ()]
         return f"{text}, sent as {', '.join(parts) or 'nothing'}"
 
 
@@ -340,7 +346,7 @@ class World:
             if read != status.registers and server.was_spaced and before is not None:
                 activation, go, position = before.echo
                 read = lines.status_registers(values | {"ACT": activation, "GTO": go, "PRE": position})
-            assert status.registers == read, f"{status!r} is not {values}"
+            assert status.registers == read, f"{status!r} is not {values}\n{server.told(status.timestamp)}"
             before = status
 
     def _check_stamps(self) -> None:
