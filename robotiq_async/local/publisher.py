@@ -15,9 +15,9 @@ Their code may hold up the loop. So a write that is due leaves first.
 # * the publication waits, too, if it is a stop, a halt, a reset or a hold: see hold_back(). State waiters are
 #   woken by the publication, and so they wait with it.
 #
-# Both waits end one turn of the loop after the image left; sooner if no image leaves, because the cycle had
-# nothing to write, or the link failed or is closed: see tell(). A write that is not expected soon, as behind
-# a slow gateway, is not waited for: Run decides that.
+# Both waits end two turns of the loop after the image left: a tunnel begins its exchange in the turn between.
+# They end sooner if no image leaves, because the cycle had nothing to write, or the link failed or is closed:
+# see tell(). A write that is not expected soon, as behind a slow gateway, is not waited for: so Run decides.
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Publisher:
     def image_leaves(self) -> None:
         """An image leaves in this turn of the loop."""
         if self.has_to_tell or self._ended:
-            self._loop.call_soon(self.tell)
+            self._loop.call_soon(self._loop.call_soon, self.tell)
 
     def tell(self) -> None:
         """Publish and answer everything that waits for a write: it has left, or there is no write."""

@@ -16,11 +16,13 @@ from robotiq_async import (
     ConnectionLostError,
     InvalidStateError,
     ProtocolError,
+    RobotiqError,
     RobotiqHand,
     State,
     Tunnel,
 )
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.values.events import Transition
 from robotiq_async.values.model import TWO_FINGER_85
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop, until
@@ -283,6 +285,35 @@ async def test_a_command_that_waited_behind_a_stuck_read_is_not_sent_later() -> 
         await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
         await asyncio.sleep(1)
         assert carries(tunnel, 200) == 0
+
+
+@pytest.mark.parametrize("call", ["stop", "halt", "hold", "reset"])
+async def test_a_write_that_is_due_is_in_the_tunnel_before_anybody_hears_of_it(call: str) -> None:
+    """A listener that blocked held it up, because the tunnel's task had not run yet."""
+    tunnel, heard = await arm(), list[str]()
+
+    def hear(item: object) -> None:
+        if isinstance(item, Transition):
+            heard.append("listener")
+
+    def note(pdu: bytes) -> bytes:
+        heard.append("write")
+        return tunnel.answer(pdu)
+
+    async def move(hand: RobotiqHand) -> None:
+        with contextlib.suppress(RobotiqError):
+            await hand.move(250, speed=0)
+        heard.append("caller")
+
+    async with RobotiqHand(tunnel, model="2f85") as hand:
+        moving = asyncio.create_task(move(hand))
+        await until(lambda: tunnel.gripper.position(JAW) > 20)
+        tunnel.trouble = {WRITE: note, WRITE_AND_READ: note}
+        hand.add_listener(hear)
+        await getattr(hand, call)()
+        await moving
+    assert heard[0] == "write"
+    assert {*heard} == {"write", "listener", "caller"}
 
 
 @pytest.mark.parametrize(
