@@ -76,13 +76,13 @@ class Wire(Exchanging):
 
     exchange_s = EXCHANGE_S
     has_current = True
-    asked_at = -math.inf  # each read leaves as its poll begins
 
     def __init__(self, speedup: float = 1.0, **options: Any) -> None:
         time = asyncio.get_running_loop().time
         self.gripper = SimulatedGripper(time, spread=False, speedup=speedup, **options)
         self.count = self.gripper.model.rtu.count
         self.is_open = False
+        self.asked_at = -math.inf
         self.calls: list[str] = []
         self.written: list[Request] = []
         self.failing: dict[str, Exception] = {}
@@ -120,6 +120,7 @@ class Wire(Exchanging):
 
     async def _carry(self, what: str) -> None:
         self.calls.append(what)
+        self.asked_at = asyncio.get_running_loop().time()
         if what in self.silent:
             await asyncio.sleep(SILENCE_S)
             self.is_open = False

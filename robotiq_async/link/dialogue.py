@@ -21,14 +21,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from itertools import cycle
+from itertools import chain, cycle
 from typing import Final
 
 from ..runtime.logger import Log
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
-from .exchange import Dialogue, Exchange, Step, Timing
+from .exchange import HUSH, READY, TURN, Dialogue, Exchange, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
 from .in_force import image_in_force, shows
 from .line import Line
@@ -50,6 +50,8 @@ REPEAT_WARNING_S: Final = 60.0
 
 Decide = Callable[[], Sequence[int] | None]
 """Returns the image to write, or None; called in the turn of the loop in which a write leaves."""
+MakeExchange = Callable[[bytes, Timing], Exchange]
+"""Makes the exchange of a request (unit and PDU) in the form of a line."""
 
 
 class Dialogues:
@@ -62,14 +64,8 @@ class Dialogues:
     """
 
     def __init__(
-        self,
-        line: Line,
-        registers: RegisterMap,
-        make: Callable[[bytes, Timing], Exchange],
-        response_timeout: float,
-        log: Log,
+        self, line: Line, registers: RegisterMap, make: MakeExchange, response_timeout: float, log: Log
     ) -> None:
-        """``make`` makes the exchange of a request (unit and PDU) in the form of the line."""
         self.line: Line = line
         self.repeats: int = 0
         self.serves_23: bool | None = None if registers.write_function == 23 else False
@@ -82,12 +78,13 @@ class Dialogues:
         self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
-        self._probes: Final = cycle(read_request(registers, count) for count in range(1, registers.count))
-        """Reads to bring the line in step, each of another number of registers than the one before."""
-        self._rest: Registers | None = None
+        self._rest: Registers | None = None if registers.count < REGISTER_COUNT else ()
         """The registers after those that a poll reads, as the first probe found them; None before it."""
+        all_of_them = () if self._rest is not None else (REGISTER_COUNT,)
+        self._probes: Final = chain(all_of_them, cycle(range(1, registers.count)))
+        """Numbers of registers: those of the reads that bring the line in step, each another one."""
         self._outstanding: Final[deque[bytes]] = deque(maxlen=MOST_OUTSTANDING)
-        """Requests whose answers may still come, in order: function, address and number of registers."""
+        """Requests whose answers may still come, in order."""
         self._unanswered: Final = deque((-math.inf,) * MOST_UNANSWERED, MOST_UNANSWERED)
         """The times of the last reads that were repeated because there was no answer."""
         self._image: Sequence[int] | None = None
@@ -111,20 +108,19 @@ class Dialogues:
         when it sees one. Over TCP an answer that is only late gives itself away by its transaction id. A
         device with three registers may refuse the read of eight, or not answer it.
         """
-        asks_for_rest = self._rest is None and self._map.count < REGISTER_COUNT
+        asks_for_rest = self._rest is None
         first = yield from self._probed()
         if isinstance(first, Outcome):
             is_harmless = isinstance(first, Silent) or (asks_for_rest and isinstance(first, Refused))
             if not (is_harmless or self._can_repeat(first)):
                 raise first.error
-            yield Step.TURN
+            yield TURN
             if isinstance(again := (yield from self._in_step(self._repeated())), Outcome):
                 raise first.error from again.error
             if asks_for_rest:
                 what = "%s did not answer a read of all registers: %s"
                 self._log.info(what, self.line.address, first.error)
-        if self.line.keeps_silence and not self.line.silence.is_long:
-            yield from self._try_short_silence()
+        yield from self._try_short_silence()
 
     def read(self) -> Dialogue[Registers]:
         """Read the status."""
@@ -136,10 +132,7 @@ class Dialogues:
     def write(self, decide: Decide) -> Dialogue[bool]:
         """Write the image that ``decide`` returns, with function 16; return whether there was one."""
         yield from self._ready()
-        if (image := decide()) is None:
-            return False
-        check((yield from self._written(image, self._whole)))
-        return True
+        return (yield from self._written_whole(decide))
 
     def write_and_read(self, decide: Decide) -> Dialogue[transport.WriteAnswer | None]:
         """Write the image that ``decide`` returns, and read the status; None if nothing new was written.
@@ -168,7 +161,7 @@ class Dialogues:
         if uses_23 and isinstance(came_to, Refused) and came_to.code == UNKNOWN_FUNCTION:
             if not (yield from self.write(decide)):
                 return None
-            yield Step.TURN
+            yield TURN
             return transport.WriteAnswer((yield from self.read()), None)
         status = self._status_in((yield from self._again(came_to, was_write=True)))
         return transport.WriteAnswer(status, came_to.error)
@@ -178,9 +171,7 @@ class Dialogues:
 
         After a disturbance it reads, which brings the line in step before a write.
         """
-        is_ready = not isinstance((yield Step.READY), Outcome)
-        if is_ready and (image := decide()) is not None:
-            check((yield from self._written(image, self._whole)))
+        if not isinstance((yield READY), Outcome) and (yield from self._written_whole(decide)):
             return None
         return (yield from self.read())
 
@@ -188,12 +179,17 @@ class Dialogues:
 
     def _ready(self) -> Dialogue[None]:
         """Make sure that a write leaves at once: it must not meet the rest of a disturbance."""
-        obstacle = yield Step.READY
-        if isinstance(obstacle, Outcome):
-            if self._can_repeat(obstacle):
-                check((yield from self._in_step()))
-                obstacle = yield Step.READY  # once: some lines add a byte to every reply
-            check(obstacle)
+        obstacle = yield READY
+        if isinstance(obstacle, Outcome) and self._can_repeat(obstacle):
+            check((yield from self._in_step()))
+            obstacle = yield READY  # once: some lines add a byte to every reply
+        check(obstacle)
+
+    def _written_whole(self, decide: Decide) -> Dialogue[bool]:
+        """Write the image that ``decide`` returns; return whether there was one."""
+        if (image := decide()) is not None:
+            check((yield from self._written(image, self._whole)))
+        return image is not None
 
     def _written(self, image: Sequence[int], timing: Timing, *, reads: bool = False) -> Dialogue[Answer]:
         """Write an image: with function 16, or with 23 if it also reads; learn whether that is served."""
@@ -206,8 +202,7 @@ class Dialogues:
             self.serves_23 = reads or self.serves_23
         elif reads and self.serves_23 is None and isinstance(came_to, Refused | Silent):
             self.serves_23 = False
-            what = "%s is written with function 16: %s"
-            self._log.warning(what, self.line.address, came_to.error)
+            self._log.warning("%s is written with function 16: %s", self.line.address, came_to.error)
         elif isinstance(came_to, Silent) and not self.line.is_shared:
             # A stop that comes again must be heard. The trial at the next opening would cost another response
             # timeout, in which fingers move on. On a line that others use it takes a short question, and they
@@ -229,7 +224,7 @@ class Dialogues:
             raise first.error
         until = self.line.now() + self._usual.seconds
         while True:
-            yield Step.TURN
+            yield TURN
             timing = self._repeated(is_long=True)  # the shorter silence may be why there was no answer
             came_to = yield from self._in_step(timing)
             if isinstance(came_to, bytes):
@@ -243,7 +238,7 @@ class Dialogues:
 
     def _in_step(self, timing: Timing | None = None) -> Dialogue[Answer]:
         """Wait for silence, and drop the rest of a damaged reply; then make sure that nothing can come."""
-        noise = yield Step.HUSH
+        noise = yield HUSH
         return noise if isinstance(noise, Outcome) else (yield from self._probed(timing))
 
     def _probed(self, timing: Timing | None = None) -> Dialogue[Answer]:
@@ -257,46 +252,39 @@ class Dialogues:
 
         The first one of all asks a jaw for eight registers, which show a wrong model.
         """
-        if self._rest is None:
-            self._rest = ()
-            if self._map.count < REGISTER_COUNT:
-                came_to = yield self._ask(read_request(self._map, REGISTER_COUNT), timing)
-                if isinstance(came_to, bytes):
-                    self._rest = registers_in(came_to)[self._map.count :]
-                    self._outstanding.clear()
-                return came_to
         while True:
-            request = next(self._probes)
+            request = read_request(self._map, next(self._probes))
             came_to = yield self._ask(request, timing)
+            if self._rest is None:
+                self._rest = registers_in(came_to)[self._map.count :] if isinstance(came_to, bytes) else ()
             if isinstance(came_to, Outcome) or self._is_in_step_after(request):
                 return came_to
 
     def _is_in_step_after(self, request: bytes) -> bool:
         """Whether no answer but those to probes can follow an answer to this probe."""
-        outstanding, poll = self._outstanding, self._poll[1:6]
-        while outstanding and outstanding.popleft() != request[1:6]:
+        outstanding, poll = self._outstanding, self._poll
+        while outstanding and outstanding.popleft() != request:
             pass
-        return all(each[0] == poll[0] and each != poll for each in outstanding)
+        return all(each[1] == poll[1] and each != poll for each in outstanding)
 
     def _try_short_silence(self) -> Dialogue[None]:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
-        for _ in range(SHORT_READS):
-            yield Step.TURN  # one exchange for each: a slow gripper keeps others waiting
+        for _ in range(SHORT_READS if self.line.silence.is_short else 0):
+            yield TURN  # one exchange for each: a slow gripper keeps others waiting
             came_to = yield from self._probed()
-            if isinstance(came_to, bytes):
-                continue
-            if not self._can_repeat(came_to):
-                raise came_to.error
-            if not isinstance(came_to, Refused):
-                self._keep_long_silence(came_to.error)
-            yield Step.TURN
-            check((yield from self._in_step()))
-            return
+            if isinstance(came_to, Outcome):
+                if not self._can_repeat(came_to):
+                    raise came_to.error
+                if not isinstance(came_to, Refused):
+                    self._keep_long_silence(came_to.error)
+                yield TURN
+                check((yield from self._in_step()))
+                break
 
     # -- requests, and the meaning of outcomes ---------------------------------------------------------------
 
     def _ask(self, request: bytes, timing: Timing | None = None) -> Exchange:
-        self._outstanding.append(request[1:6])
+        self._outstanding.append(request)
         return self._make(request, timing or self._usual)
 
     def _can_repeat(self, outcome: Outcome) -> bool:
@@ -329,8 +317,8 @@ class Dialogues:
 
     def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
         """Take the longer silence from here on, because a request after the shorter one had no answer."""
-        line = self.line
-        if line.keeps_silence and not line.silence.is_long:
-            line.silence.lengthen()
+        silence = self.line.silence
+        if silence.is_short:
+            silence.lengthen()
             what = "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s"
-            self._log.warning(what, line.address, 1000 * line.silence.short_s, why)
+            self._log.warning(what, self.line.address, 1000 * silence.short_s, why)

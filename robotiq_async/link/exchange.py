@@ -74,12 +74,8 @@ class Exchange(ABC):
 class TcpExchange(Exchange):
     """A request over Modbus TCP."""
 
-    def __init__(self, number: int, request: bytes, timing: Timing) -> None:
-        super().__init__(frames.tcp_frame(number, request), timing)
-        self._expected = frames.expected_over_tcp(request)
-
     def _verdict(self, received: bytes) -> Answer | None:
-        header, expected = self.frame[:4], self._expected
+        header, expected = self.frame[:4], frames.expected_over_tcp(self.frame[6:])
         # The usual case, which is cheap: the header is the only part of a reply that is not as the last time.
         is_usual = len(received) == 4 + expected.size and received.startswith(expected.start, 4)
         if is_usual and received.startswith(header):
@@ -92,10 +88,10 @@ class PduExchange(Exchange):
 
     def __init__(self, request: bytes, timing: Timing) -> None:
         super().__init__(request[1:], timing)
-        self._expected = frames.expected_in_a_tunnel(request)
 
     def _verdict(self, received: bytes) -> Answer | None:
-        return self._expected.verdict(received) or frames.noise(f"half an answer: {frames.show(received)}")
+        answer = frames.expected_in_a_tunnel(self.frame).verdict(received)
+        return answer or frames.noise(f"half an answer: {frames.show(received)}")
 
 
 class Step(Enum):
@@ -106,9 +102,7 @@ class Step(Enum):
     TURN = "that others have their turn"
 
 
-READY: Final = Step.READY
-HUSH: Final = Step.HUSH
-TURN: Final = Step.TURN
+READY, HUSH, TURN = Step
 DONE: Final = b""
 """A wish that was fulfilled comes to this."""
 
@@ -155,8 +149,7 @@ class SerialExchange(Exchange):
         size = self._expected.size if frames.is_write(self.frame) else len(reply)
         verdict = self._expected.verdict(reply[:size])
         if type(verdict) is bytes:
-            if self._echo.is_on is None:
-                self._echo.learn(is_on=False)
+            self._echo.learn(is_on=bool(self._echo.is_on))
             if len(reply) > size:
                 self.extra = frames.stray(reply[size:])
         return verdict
@@ -166,8 +159,9 @@ class SerialExchange(Exchange):
         size = len(self.frame)
         if received[:size] != self.frame[: len(received)]:
             if self._echo.is_on:
-                what = f"the line echoes what is sent, but not this time: {frames.show(received)}"
-                return frames.noise(what)
+                return frames.noise(
+                    f"the line echoes what is sent, but not this time: {frames.show(received)}"
+                )
             return received
         if len(received) < size:
             return b""

@@ -210,9 +210,9 @@ def expected_over_tcp(request: bytes) -> Expected:
 
 
 @lru_cache(maxsize=32)
-def expected_in_a_tunnel(request: bytes) -> Expected:
-    """The same through a tunnel, which keeps the unit id to itself."""
-    start, size, refusal, refusal_size, _ = expected_reply(request)
+def expected_in_a_tunnel(pdu: bytes) -> Expected:
+    """The reply to a PDU through a tunnel, which keeps the unit id to itself."""
+    start, size, refusal, refusal_size, _ = expected_reply(b"\0" + pdu)
     return Expected(start[1:], size - 1, refusal[1:], refusal_size - 1, 0)
 
 

@@ -35,24 +35,16 @@ def image_in_force(shown: Registers, written: Sequence[int] | None) -> Sequence[
     """
     if not shown or reg.gFLT.read(shown):
         return ()
-    if written is None:
-        return _image_of(shown)
     target, position = reg.gPR[0].read(shown), reg.gPO[0].read(shown)
-    has_come = reg.gOBJ.read(shown) == AT_TARGET and TWO_FINGER_85.has_reached(target, position)
-    if not written or reg.rATR.read(written) or (reg.gGTO.read(shown) and not has_come):
-        return ()
-    return written if shows(shown, written) else ()
+    is_at_target = reg.gOBJ.read(shown) == AT_TARGET
+    if written is None:
+        is_active = reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE
+        is_still = is_active and is_at_target and abs(target - position) <= TOLERANCE
+        return (shown[0] & ECHOED, target, 0, 0, 0, 0, 0, 0) if is_still else ()
+    is_still = not reg.gGTO.read(shown) or (is_at_target and TWO_FINGER_85.has_reached(target, position))
+    return written if is_still and written and shows(shown, written) and not reg.rATR.read(written) else ()
 
 
 def shows(shown: Registers, image: Sequence[int]) -> bool:
     """Whether a status has the echo of an image, which it may have of an earlier one, too."""
     return all(echo.read(shown) == field.read(image) for echo, field in _ECHOES)
-
-
-def _image_of(shown: Registers) -> Sequence[int]:
-    """The request that an adopted jaw shows, or empty."""
-    target = reg.gPR[0].read(shown)
-    is_there = reg.gOBJ.read(shown) == AT_TARGET and abs(target - reg.gPO[0].read(shown)) <= TOLERANCE
-    if not (is_there and reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE):
-        return ()
-    return (shown[0] & ECHOED, target, 0, 0, 0, 0, 0, 0)

@@ -28,8 +28,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import inspect
-import logging
 import math
 from collections.abc import Callable
 from enum import Enum
@@ -37,17 +35,17 @@ from typing import Final, TypeVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
 from ..runtime.limit import Limit
-from ..runtime.logger import Log, log
+from ..runtime.logger import Log
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
 from .address import Address
 from .canonical import canonical_address
-from .exchange import DONE, HUSH, READY, TURN, Dialogue, EchoFilter, Exchange
+from .exchange import DONE, HUSH, TURN, Dialogue, EchoFilter, Exchange, Step
 from .frames import stray
 from .outcome import Answer, Lost, Noise, Outcome, Refused, Stray, check
 from .serial.patience import LinePatience
 from .serial.silence import Silence
 from .watchdog import Watchdog
-from .wires import Send, Wire, wire_to
+from .wires import Send, SerialWire, SocketWire, Wire
 
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
@@ -81,10 +79,9 @@ class Line:
         state: the kind of bytes that may arrive; changed by :meth:`_become` alone.
         why: the outcome that has disturbed the line, or ended it; None if it was closed by its users.
         forgives: whether a lost or damaged byte is no reason to give up the line.
-        keeps_silence: whether this end keeps the silence between frames; a serial server keeps its own.
-        silence: that silence.
+        silence: that between two frames.
         echo: whether the line brings back each request.
-        asked_at: the time of the last request, by the loop's own clock.
+        asked_at: the time of the last request.
     """
 
     def __init__(
@@ -94,28 +91,27 @@ class Line:
         *,
         wire: Wire | None = None,
         shares: bool = False,
-        log: Log = log,
     ) -> None:
         """Keep the settings; opens nothing.
 
         ``stray`` judges bytes without a request. ``wire`` is the usual one to the address unless given. With
-        ``shares`` the line may have several users at a time. ``log`` is that of its only user.
+        ``shares`` the line may have several users at a time.
         """
-        self.state, self.why = CLOSED, None
-        self.forgives: bool = address.is_rtu
-        self.keeps_silence: bool = address.kind == "rtu"
-        self.silence: Silence = Silence(address.line.character_s)
-        self.echo: EchoFilter = EchoFilter()
+        self.state: LineState = CLOSED
+        self.why: Outcome | None = None
+        self.forgives: Final = address.is_rtu
+        is_port = address.kind == "rtu"
+        self.silence: Final = Silence(address.line.character_s if is_port else 0.0)
+        self.echo: Final = EchoFilter()
         self.asked_at: float = -math.inf
         self.address: Final = address
-        self._wire: Final = wire or wire_to(address)
+        self._wire: Final = wire or (SerialWire if is_port else SocketWire)(address)
         self._stray: Final = stray
         self._shares: Final = shares
         self._turns: Final = asyncio.Lock()
         self._users: Final[set[object]] = set()
-        self._log: Final = log
         self._holders: Final[WeakKeyDictionary[object, Log]] = WeakKeyDictionary()
-        """Those whose line it is, and who open it again after a loss, whether they are users now or not."""
+        """The logs of those who open it again after a loss, whether they are users now or not."""
         self._patience: Final = LinePatience()
         self._speaker: object = None
         """Who had the last turn, and has not left since."""
@@ -124,35 +120,26 @@ class Line:
         self._send: Send
         self._watchdog: Watchdog
 
-    state: LineState
-    why: Outcome | None
-
     @classmethod
-    def shared(cls, address: Address, user: object, log: Log) -> Line:
+    def shared(cls, address: Address) -> Line:
         """The line at an address, which all its users in the running event loop share.
-
-        It is held for ``user``, who has ``log``, until :meth:`release`, also while the connection is down.
 
         Raises:
             ConnectFailedError: others hold it with another rate, parity or number of stop bits.
         """
         place = asyncio.get_running_loop(), canonical_address(address)
-        line = _shared.get(place) or cls(address, shares=True)
-        holders = line._holders  # noqa: SLF001  # of the same kind
-        if line.address.line != address.line:
-            if holders:
-                raise ConnectFailedError(str(address), f"the port is in use as {line.address}")
-            line = cls(address, shares=True)
-            holders = line._holders
-        _shared[place] = line
-        holders[user] = log
+        line = _shared.get(place)
+        if line is None or not (line._holders or line.address.line == address.line):  # noqa: SLF001
+            line = _shared[place] = cls(address, shares=True)
+        elif line.address.line != address.line:
+            raise ConnectFailedError(str(address), f"the port is in use as {line.address}")
         return line
 
     def _become(self, state: LineState, why: Outcome | None = None) -> None:
         """Change the state; the log of each hand that has the line tells, at DEBUG."""
-        if state is not self.state and self._log.isEnabledFor(logging.DEBUG):
+        if state is not self.state:
             reason = "" if why is None else f" ({why.error})"
-            for each in list(self._holders.values()) or [self._log]:
+            for each in list(self._holders.values()):
                 each.debug("line: %s -> %s%s", self.state.name, state.name, reason)
         self.state, self.why = state, why
 
@@ -165,18 +152,20 @@ class Line:
         return user in self._users
 
     def now(self) -> float:
-        """The time by the loop's own clock, as the watchdog has it."""
-        return self._watchdog.loop.time()
+        return self._watchdog.clock()
 
     # -- its users ---------------------------------------------------------------------------------------
 
-    async def open(self, user: object, seconds: float) -> None:
+    async def open(self, user: object, seconds: float, log: Log) -> None:
         """Connect, unless another user has; ``seconds`` at most.
+
+        The line is held for the user, who has ``log``, until :meth:`release`, also while it is closed.
 
         Raises:
             ConnectFailedError: refused, unreachable, no such port, or no pyserial.
             RobotiqConnectionError: the connection was closed at once, or bytes arrive without a request.
         """
+        self._holders[user] = log
         async with self._turns:
             if self.state is CLOSED:
                 await self._connect(seconds)
@@ -184,7 +173,7 @@ class Line:
 
     async def _connect(self, seconds: float) -> None:
         _close_left()
-        self._watchdog = Watchdog(lambda: self._in_flight is not None, self._on_timeout)
+        self._watchdog = Watchdog(self._on_timeout)
         self.echo.learn(is_on=None)
         self._become(OPENING)
         try:
@@ -221,7 +210,7 @@ class Line:
     def _break_off(self, user: object) -> None:
         """End the use of a line on which a reply may still come."""
         if self._in_flight is not None or user in self._users:
-            self._end(Lost(self._not_connected()))
+            self._end(self._lost())
             self._speaker = None
             self.leave(user)
 
@@ -230,7 +219,7 @@ class Line:
             self._become(CLOSED, why)
             self._users.clear()
             self._watchdog.stop()
-            self._end(why or Lost(self._not_connected()))
+            self._end(self._lost())
             self._wire.close()
 
     def close_if_loop_closed(self) -> None:
@@ -248,15 +237,9 @@ class Line:
         Raises:
             RobotiqConnectionError: the dialogue has raised it; the user has left the line.
         """
+        step: Exchange | Step | None = None
         while True:
-            try:
-                must_hush = self._shares and await self._take_turn(user)
-            except BaseException:
-                # Before the first turn the user has nothing on its way, and stays. Between two turns it may
-                # have, and another one has the line, whose exchange must not end.
-                if inspect.getgeneratorstate(dialogue) != inspect.GEN_CREATED:
-                    self.leave(user)
-                raise
+            must_hush = self._shares and await self._take_turn(user, has_begun=step is not None)
             try:
                 if must_hush:
                     check(await self._hush())
@@ -265,10 +248,11 @@ class Line:
                     if step is HUSH:
                         came_to = await self._hush()
                     else:
-                        if self.keeps_silence and self.state is not CLOSED:
-                            is_long = step is not READY and step.timing.is_long
+                        if self.silence.short_s and self.state is not CLOSED:
+                            is_long = isinstance(step, Exchange) and step.timing.is_long
                             await self.silence.keep(self._watchdog.clock, is_long=is_long)
-                        came_to = self._obstacle(user) or (DONE if step is READY else await self._begin(step))
+                        why = self.why if user in self._users else self._lost()
+                        came_to = why or (await self._begin(step) if isinstance(step, Exchange) else DONE)
                     step = dialogue.send(came_to)
             except StopIteration as end:
                 result: T = end.value
@@ -280,23 +264,27 @@ class Line:
                 if self._shares:
                     self._turns.release()
 
-    async def _take_turn(self, user: object) -> bool:
+    async def _take_turn(self, user: object, *, has_begun: bool) -> bool:
         """Wait until this user has the line alone; return whether another one has left a reply on its way."""
-        if self.is_shared and (rest := self._patience.until(user) - self.now()) > 0:
-            await asyncio.sleep(rest)
-        await self._turns.acquire()
+        try:
+            if self.is_shared and (rest := self._patience.until(user) - self.now()) > 0:
+                await asyncio.sleep(rest)
+            await self._turns.acquire()
+        except BaseException:
+            # Before the first turn the user has nothing on its way, and stays. Between two turns it may have,
+            # and another one has the line, whose exchange must not end.
+            if has_begun:
+                self.leave(user)
+            raise
         before, self._speaker = self._speaker, user
         is_left_over = self.state is DISTURBED and not isinstance(self.why, Stray)
         return is_left_over and before is not user and user in self._users
 
-    def _obstacle(self, user: object) -> Outcome | None:
-        """The obstacle to a request of this user."""
+    def _lost(self) -> Lost:
+        """The outcome for one who is no user of the line, or no more."""
         if self.state is CLOSED and self.why is not None:
             return Lost(renewed(self.why.error))
-        return self.why if user in self._users else Lost(self._not_connected())
-
-    def _not_connected(self) -> ConnectionLostError:
-        return ConnectionLostError(f"not connected to {self.address}")
+        return Lost(ConnectionLostError(f"not connected to {self.address}"))
 
     def _begin(self, exchange: Exchange) -> asyncio.Future[Answer]:
         """Send a request; return the future of its answer."""
@@ -319,16 +307,14 @@ class Line:
         if self.state is CLOSED or (self.state is IN_STEP and self.is_shared):
             return DONE
         self._become(HUSHING)
-        clock = self._watchdog.clock
-        began = clock()
-        until = began + HUSH_S
-        while (left := until - clock()) > 0:
+        clock, silence = self._watchdog.clock, self.silence
+        silence.hear(began := clock())
+        while (left := silence.heard + HUSH_S - clock()) > 0:
             if clock() - began > LONGEST_HUSH_S:
                 noise = Noise(ProtocolError(f"{self.address}: the line does not become silent"))
                 self._end(noise)
                 return noise
             await asyncio.sleep(left)
-            until = max(until, self.silence.heard + HUSH_S)
         if self.state is HUSHING:
             self._become(IN_STEP)
         return DONE
@@ -357,9 +343,9 @@ class Line:
             self._end(outcome)
 
     def _on_timeout(self) -> None:
-        assert self._in_flight is not None, "only an exchange is watched"
-        exchange, _, seconds = self._in_flight
-        self._end(exchange.late(self.address, seconds))
+        if self._in_flight is not None:
+            exchange, _, seconds = self._in_flight
+            self._end(exchange.late(self.address, seconds))
 
     def _end(self, answer: Answer) -> None:
         """End the exchange in flight, if there is one; without a whole reply, more may come."""

@@ -14,34 +14,32 @@ has the requests, line.py their time, and exchange.py and frames.py judge the re
 
 from __future__ import annotations
 
-import logging
 import secrets
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Coroutine
 from itertools import count
 from typing import Any, Final
 
 from ..runtime.logger import Log, log
 from ..values.registers import RegisterMap, Registers
 from .address import Address
-from .dialogue import Decide, Dialogues
+from .dialogue import Decide, Dialogues, MakeExchange
 from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange, Timing
+from .frames import tcp_frame
 from .line import Line
 from .transport import WriteAnswer
 from .tunnel.protocol import Tunnel, tunnel_to
 from .tunnel.wire import TunnelWire
-
-# pymodbus logs every failed connection attempt; our exceptions say the same. A level that the application
-# sets on its logger stays.
-_pymodbus_log = logging.getLogger("pymodbus.logging")
-if _pymodbus_log.level == logging.NOTSET:
-    _pymodbus_log.setLevel(logging.CRITICAL + 1)
 
 LAST_NUMBER: Final = 0xFFFF
 """Transaction ids are 1 to this."""
 
 
 class ModbusTransport:
-    """A gripper behind Modbus."""
+    """A gripper behind Modbus.
+
+    Attributes:
+        dialogues: those with it, and the number of reads that were repeated.
+    """
 
     has_current = True
 
@@ -70,43 +68,38 @@ class ModbusTransport:
         self._log: Final = log
         self._numbers: Final = count(secrets.randbelow(LAST_NUMBER))
         """For the transaction ids; start at random to differ from those of other programs."""
-        make: Callable[[bytes, Timing], Exchange] = self._over_a_line if address.is_rtu else self._over_tcp
-        line = Line(address, wire=self._tunnel, log=log)
+        make: MakeExchange = self._over_a_line if address.is_rtu else self._over_tcp
+        line = Line(address, wire=self._tunnel)
         make = make if tunnel is None else PduExchange
-        self._dialogues: Final = Dialogues(line, registers, make, response_timeout, log)
+        self.dialogues: Final = Dialogues(line, registers, make, response_timeout, log)
 
     def _over_tcp(self, request: bytes, timing: Timing) -> Exchange:
-        number = next(self._numbers) % LAST_NUMBER + 1  # never 0, which some devices answer to anything
-        return TcpExchange(number, request, timing)
+        # Never with the number 0, which some devices answer to anything.
+        return TcpExchange(tcp_frame(next(self._numbers) % LAST_NUMBER + 1, request), timing)
 
     def _over_a_line(self, request: bytes, timing: Timing) -> Exchange:
-        return SerialExchange(request, timing, self._dialogues.line.echo, has_others=self._shares_line)
-
-    @property
-    def repeats(self) -> int:
-        """Number of reads repeated because an answer was missing or damaged."""
-        return self._dialogues.repeats
+        return SerialExchange(request, timing, self.dialogues.line.echo, has_others=self._shares_line)
 
     @property
     def is_open(self) -> bool:
-        return self._dialogues.line.is_open_for(self)
+        return self.dialogues.line.is_open_for(self)
 
     @property
     def asked_at(self) -> float:
-        return self._dialogues.line.asked_at
+        return self.dialogues.line.asked_at
 
     @property
     def is_shared(self) -> bool:
-        return self._dialogues.line.is_shared
+        return self.dialogues.line.is_shared
 
     @property
     def echoes(self) -> bool:
         """Whether the line was seen to echo requests; the echo is dropped."""
-        return bool(self._dialogues.line.echo.is_on)
+        return bool(self.dialogues.line.echo.is_on)
 
     @property
     def reads_with_writes(self) -> bool:
-        return self._dialogues.serves_23 is not False
+        return self.dialogues.serves_23 is not False
 
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier request is taken for one to come.
@@ -117,24 +110,24 @@ class ModbusTransport:
             ConnectionLostError: the connection was closed at once.
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
-        self._dialogues.line.leave(self)
+        self.dialogues.line.leave(self)
         if self._shares_line:
-            self._dialogues.move_to(Line.shared(self._dialogues.line.address, self, self._log))
-        await self._dialogues.line.open(self, self._connect_timeout)
-        await self._dialogues.line.talk(self, self._dialogues.opening())
+            self.dialogues.move_to(Line.shared(self.dialogues.line.address))
+        await self.dialogues.line.open(self, self._connect_timeout, self._log)
+        await self.dialogues.line.talk(self, self.dialogues.opening())
 
     # Each poll makes one of these calls: no coroutine of their own, which would cost as much as the request.
 
     def read(self) -> Coroutine[Any, Any, Registers]:
-        return self._dialogues.line.talk(self, self._dialogues.read())
+        return self.dialogues.line.talk(self, self.dialogues.read())
 
     def send(self, decide: Decide) -> Coroutine[Any, Any, bool]:
-        """Write the image that ``decide`` returns, if any; on a serial line after the silence between frames.
+        """Write the image that ``decide`` returns, if any, with one function 16; a jaw has three registers.
 
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        return self._dialogues.line.talk(self, self._dialogues.write(decide))
+        return self.dialogues.line.talk(self, self.dialogues.write(decide))
 
     def send_and_read(self, decide: Decide) -> Coroutine[Any, Any, WriteAnswer | None]:
         """Write the image that ``decide`` returns, if any, and read the status, with function 23.
@@ -142,7 +135,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
         """
-        return self._dialogues.line.talk(self, self._dialogues.write_and_read(decide))
+        return self.dialogues.line.talk(self, self.dialogues.write_and_read(decide))
 
     def stop_or_read(self, decide: Decide) -> Coroutine[Any, Any, Registers | None]:
         """Write the image that ``decide`` returns when the turn comes, if any; else read the status.
@@ -150,18 +143,10 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
-        return self._dialogues.line.talk(self, self._dialogues.stop_or_read(decide))
-
-    async def write(self, registers: Sequence[int]) -> None:
-        """Write the request registers with one FC16, exactly once; a jaw has three of the eight.
-
-        Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
-        """
-        await self.send(lambda: registers)
+        return self.dialogues.line.talk(self, self.dialogues.stop_or_read(decide))
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed. Waits for a tunnel to close, half a second at most."""
-        self._dialogues.line.release(self)
+        self.dialogues.line.release(self)
         if self._tunnel is not None:
             await self._tunnel.closed()

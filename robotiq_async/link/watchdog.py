@@ -25,43 +25,40 @@ class Watchdog:
         clock: its time, in finer steps where the loop's own are coarse.
     """
 
-    def __init__(self, is_waiting: Callable[[], bool], on_timeout: Callable[[], None]) -> None:
-        """Watch in the running loop."""
+    def __init__(self, on_timeout: Callable[[], None]) -> None:
+        """Watch in the running loop. ``on_timeout`` is called for an exchange that has ended, too."""
         self.loop: Final = asyncio.get_running_loop()
         self.clock: Final = clock_of(self.loop)
-        self._is_waiting = is_waiting
-        self._on_timeout = on_timeout
+        self._on_timeout: Final = on_timeout
         self._due = 0.0
         self._has_grace = False
         # The handle of a foreign loop (qasync's) does not give its time, so that is kept beside it.
         self._timer: asyncio.Handle | None = None
-        self._timer_due = math.inf
+        self._timer_due = math.inf  # while there is no timer
 
     def watch(self, seconds: float, by: float) -> float:
-        """Watch an exchange that may take some seconds, and no longer than ``by``; return the loop's time."""
-        began = self.loop.time()
+        """Watch an exchange that may take some seconds, and no longer than ``by``; return the time."""
+        began = self.clock()
         self._due = began + seconds
         if by < self._due:
             self._due = by
         self._has_grace = False
-        if self._timer is not None and self._timer_due > self._due:
+        if self._timer_due > self._due:
             self.stop()
-        if self._timer is None:
             self._set_timer()
         return began
 
     def stop(self) -> None:
         """Stop watching."""
         timer, self._timer = self._timer, None
+        self._timer_due = math.inf
         if timer is not None:
             timer.cancel()
 
     def _look(self, when: float) -> None:
         # After a block asyncio handles sockets before timers, so a reply that was waiting counts as in time.
-        self._timer = None
-        if not self._is_waiting():
-            return
-        now = self.loop.time()
+        self.stop()
+        now = self.clock()
         if now >= self._due and now - when > HELD_S and not self._has_grace:
             self._due, self._has_grace = now + GRACE_S, True
         if now < self._due:

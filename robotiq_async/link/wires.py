@@ -49,12 +49,10 @@ ErrorTable = Mapping[type[Exception], Callable[[Any], str]]
 """The reason to show for each kind of error that a call may raise; the first kind that fits counts. An error
 that is not in the table is its own reason."""
 RESOLVING: Final[ErrorTable] = {
-    OSError: lambda error: f"the name cannot be resolved: {error.strerror or error}",
-    Exception: lambda error: f"the name cannot be resolved: {error}",  # no host name, or no thread for it
+    # Of the system; or it is no host name, or there is no thread for it.
+    Exception: lambda error: f"the name cannot be resolved: {getattr(error, 'strerror', None) or error}",
 }
-CONNECTING: Final[ErrorTable] = {
-    OSError: lambda error: why_no_socket() or why_unreachable(error),
-}
+CONNECTING: Final[ErrorTable] = {OSError: lambda error: why_no_socket() or why_unreachable(error)}
 OPENING_ERRORS: Final[ErrorTable] = {
     ImportError: lambda _: f"serial ports need pyserial: {install('serial')}",
     OSError: why_no_port,
@@ -67,7 +65,8 @@ class Wire(Protocol):
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
         """Connect; return a function that sends a frame.
 
-        That never blocks, and raises OSError when the wire has ended.
+        That never blocks, and raises OSError when the wire has ended. Who opens a wire also closes it, when
+        this has failed, too.
 
         Args:
             on_data: gets all bytes, from the first one on.
@@ -80,11 +79,6 @@ class Wire(Protocol):
 
     def close(self) -> None:
         """Close it at once; does nothing when closed."""
-
-
-def wire_to(address: Address) -> Wire:
-    """The wire to a serial port or a socket."""
-    return SerialWire(address) if address.kind == "rtu" else SocketWire(address)
 
 
 @contextlib.contextmanager
@@ -129,14 +123,10 @@ class _ClientWire:
 
         self._client = client = make(trace_connect=on_connection, retries=0, reconnect_delay=0)
         client.ctx.data_received = on_data  # type: ignore[method-assign, assignment]
-        try:
-            transport, _ = await client.ctx.call_create()
-            client.ctx.transport = transport
-            send = self._set_up(transport, on_data, on_end)
-            await is_made.wait()  # a serial port is watched from the next turn of the loop on
-        except BaseException:
-            self.close()
-            raise
+        transport, _ = await client.ctx.call_create()
+        client.ctx.transport = transport
+        send = self._set_up(transport, on_data, on_end)
+        await is_made.wait()  # a serial port is watched from the next turn of the loop on
         return send
 
     def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> Send:
@@ -155,11 +145,10 @@ class SocketWire(_ClientWire):
         Each address but the last gets an equal part of the time: one that does not answer leaves some for the
         others.
         """
-        place = self._address
-        with failing_as(RESOLVING, place):
-            hosts = await addresses_of(place.host, place.port)
-        *others, last = (partial(AsyncModbusTcpClient, host, port=place.port) for host in hosts)
-        with failing_as(CONNECTING, place):
+        with failing_as(RESOLVING, self._address):
+            hosts = await addresses_of(self._address.host, self._address.port)
+        *others, last = (partial(AsyncModbusTcpClient, host, port=self._address.port) for host in hosts)
+        with failing_as(CONNECTING, self._address):
             for make in others:
                 with contextlib.suppress(OSError), Limit(seconds / len(hosts)):
                     return await self._connect(make, on_data, on_end)

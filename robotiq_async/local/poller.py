@@ -297,5 +297,5 @@ class Poller:
         period = None if self._last_poll is None else asked - self._last_poll
         self._counters.note_poll(asked, status.timestamp, period)
         self._last_poll = self._asked = asked  # no command is written right behind a repeated read
-        self._controller.see(status, max(asked, self._link.asked_at))
+        self._controller.see(status, self._link.asked_at)
         self._publisher.publish_status(status)

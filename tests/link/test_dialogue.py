@@ -39,8 +39,7 @@ class Place:
     """The line as a dialogue knows it."""
 
     address = "rtu://X"
-    silence = Silence(10 / 115200)
-    keeps_silence = False
+    silence = Silence(0.0)
     forgives = True
     is_shared = False
 

@@ -13,6 +13,7 @@ from robotiq_async.link.line import HUSH_S
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.serial.silence import LONG_S
 from tests.link.scripted_device import Device, unopened, wrong_checksum
+from tests.link.writing import write_image
 from tests.serial_line import with_crc
 from tests.virtual_line import VirtualLine
 
@@ -37,8 +38,8 @@ async def reads_and_writes(transport: ModbusTransport, device: Device) -> None:
     """Reads and writes succeed in turns, none of them at the second attempt."""
     for _ in range(5):
         await newest(transport, device)
-        await transport.write(IMAGE)
-    assert transport.repeats == 0
+        await write_image(transport, IMAGE)
+    assert transport.dialogues.repeats == 0
 
 
 # -- three registers ---------------------------------------------------------------------------------------
@@ -50,7 +51,7 @@ async def test_a_jaw_is_asked_for_eight_registers_once_and_for_three_from_then_o
     await jaw.open()
     for _ in range(3):
         await newest(jaw, device)
-    await jaw.write(IMAGE)
+    await write_image(jaw, IMAGE)
     first, *others = counts(device)
     assert first == 8
     assert set(others) == {1, 2, 3}
@@ -71,7 +72,7 @@ async def test_a_jaw_that_serves_no_more_than_three_registers_works(
     device.most = 3
     await jaw.open()
     assert await jaw.read() == (len(device.requests),) * 3 + (0,) * 5
-    await jaw.write(IMAGE)
+    await write_image(jaw, IMAGE)
 
 
 async def test_late_replies_never_give_a_jaw_an_old_status(jaw: ModbusTransport, device: Device) -> None:
@@ -99,7 +100,7 @@ async def test_two_frames_keep_a_silence_of_3_5_characters(
     for _ in range(20):
         await transport.read()
         answered = asyncio.get_running_loop().time()
-        await transport.write(IMAGE)
+        await write_image(transport, IMAGE)
         assert SHORT_S - 1e-6 <= device.asked_at - answered <= SHORT_S + 0.0001
 
 
@@ -127,10 +128,10 @@ async def test_a_line_that_does_not_answer_a_write_gets_the_longer_silence(devic
     await transport.read()
     device.least_pause = LONG_S - 1e-6
     with pytest.raises(ResponseTimeoutError):
-        await transport.write(IMAGE)
+        await write_image(transport, IMAGE)
     began = asyncio.get_running_loop().time()
     await transport.open()
-    await transport.write(IMAGE)
+    await write_image(transport, IMAGE)
     assert asyncio.get_running_loop().time() - began < 0.03, "no exchange without an answer"
     await transport.close()
 
@@ -196,9 +197,9 @@ async def test_bytes_between_two_requests_cost_a_read_and_not_the_link(
     for _ in range(20):
         await asyncio.sleep(0)
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1
 
 
 @pytest.mark.parametrize("stray", [b"\x00", b"\xff", b"\x00\xff\x00"])
@@ -230,7 +231,7 @@ async def test_nothing_is_asked_while_the_rest_of_a_damaged_reply_comes(
     await newest(transport, device)
     assert asked_by_then == [asked] * 3
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1
 
 
 @pytest.mark.parametrize("stray", [b"\x00", b"\xff", b"\x00\xff\x00"])
@@ -238,16 +239,16 @@ async def test_a_byte_after_an_acknowledgement_leaves_the_write_acknowledged(
     transport: ModbusTransport, device: Device, stray: bytes
 ) -> None:
     device.spoil = lambda reply: reply + stray
-    await transport.write(IMAGE)
+    await write_image(transport, IMAGE)
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1
 
 
 async def test_a_write_does_not_meet_the_rest_of_a_disturbance(
     transport: ModbusTransport, device: Device
 ) -> None:
     device.spoil = lambda reply: reply + b"\x00"
-    await transport.write(IMAGE)
+    await write_image(transport, IMAGE)
     asked = len(device.requests)
     assert await transport.send(lambda: IMAGE)
     assert [request[1] for request in device.requests[asked:]] == [3, 16]
@@ -287,7 +288,7 @@ async def test_an_acknowledgement_with_a_wrong_checksum_acknowledges_nothing(
 ) -> None:
     device.spoil = lambda reply: wrong_checksum(reply) + b"\x00"
     with pytest.raises(ProtocolError, match="checksum"):
-        await transport.write(IMAGE)
+        await write_image(transport, IMAGE)
     assert not transport.is_open
 
 
@@ -308,7 +309,7 @@ async def test_the_echo_of_a_write_acknowledges_nothing(device: Device) -> None:
     await transport.open()
     device.loses = 1
     with pytest.raises(ResponseTimeoutError):
-        await transport.write(IMAGE)
+        await write_image(transport, IMAGE)
 
 
 async def test_an_echo_without_any_reply_is_no_gripper(device: Device) -> None:
@@ -330,7 +331,7 @@ async def test_an_echo_that_is_missing_once_costs_a_read(device: Device) -> None
 
     device.spoil = back
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1
     await transport.close()
 
 
@@ -347,7 +348,7 @@ async def test_a_passing_exception_to_a_read_is_asked_again(
 ) -> None:
     device.spoil = exception(code)
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1
 
 
 @pytest.mark.parametrize(
@@ -379,11 +380,11 @@ async def test_a_busy_device_gets_no_write_twice(transport: ModbusTransport, dev
     asked = len(device.requests)
     device.spoil = exception(6)
     with pytest.raises(ProtocolError, match="exception 6"):
-        await transport.write(IMAGE)
+        await write_image(transport, IMAGE)
     assert len(device.requests) == asked + 1
 
 
 async def test_a_damaged_exception_is_damage(transport: ModbusTransport, device: Device) -> None:
     device.spoil = lambda reply: wrong_checksum(exception(2)(reply))
     await newest(transport, device)
-    assert transport.repeats == 1
+    assert transport.dialogues.repeats == 1

@@ -82,7 +82,7 @@ async def test_a_stray_byte_after_the_reply_costs_the_next_read(jaw: ModbusTrans
     assert answer is not None
     assert answer.doubt is None
     assert (await jaw.read())[0] == len(device.requests)
-    assert jaw.repeats == 1
+    assert jaw.dialogues.repeats == 1
 
 
 async def test_a_device_that_refuses_the_function_is_written_with_16(

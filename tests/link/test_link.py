@@ -31,6 +31,7 @@ from robotiq_async import (
 from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.values.registers import TCP_REGISTERS
+from tests.link.writing import write_image
 from tests.patience import patience
 
 STATUS = bytes(range(16))
@@ -108,7 +109,7 @@ async def linked(answer: Answer | None = None) -> AsyncIterator[tuple[ModbusTran
 async def test_a_read_and_a_write() -> None:
     async with linked() as (transport, scripted):
         assert await transport.read() == REGISTERS
-        await transport.write(IMAGE)
+        await write_image(transport, IMAGE)
         assert transport.is_open
     read, write = scripted.requests
     assert read[6:] == bytes.fromhex("02 04 0000 0008")
@@ -166,7 +167,7 @@ async def test_a_wrong_echo_of_a_write_is_never_taken(at: int) -> None:
 
     async with linked(corrupt) as (transport, scripted):
         with pytest.raises(ProtocolError):
-            await transport.write(IMAGE)
+            await write_image(transport, IMAGE)
         assert not transport.is_open
         assert len(scripted.requests) == 1
 
@@ -194,7 +195,7 @@ async def test_a_closed_connection_ends_the_request_at_once() -> None:
 async def test_an_unanswered_write_is_sent_once() -> None:
     async with linked(lambda _: []) as (transport, scripted):
         with pytest.raises(ResponseTimeoutError):
-            await transport.write(IMAGE)
+            await write_image(transport, IMAGE)
         scripted.answer = lambda request: [good(request)]
         await transport.open()
         await transport.read()
@@ -283,7 +284,7 @@ async def test_no_transaction_number_comes_twice_over_all_connections() -> None:
         for _ in range(5):
             for _ in range(3):
                 await transport.read()
-                await transport.write(IMAGE)
+                await write_image(transport, IMAGE)
             await transport.open()
         used = numbers(scripted)
         assert len(set(used)) == len(used) == 35
@@ -325,7 +326,7 @@ async def test_a_closed_transport_says_so_and_closes_twice() -> None:
         with pytest.raises(ConnectionLostError):
             await transport.read()
         with pytest.raises(ConnectionLostError):
-            await transport.write(IMAGE)
+            await write_image(transport, IMAGE)
 
 
 async def test_opening_again_leaves_no_old_connection() -> None:
@@ -375,7 +376,7 @@ def resolved(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 def to_the_host(transport: ModbusTransport) -> ModbusTransport:
     """A transport to the same port, by a name."""
-    address = f"gripper.example:{transport._dialogues.line.address.port}"
+    address = f"gripper.example:{transport.dialogues.line.address.port}"
     return ModbusTransport(parse_address(address), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1)
 
 
@@ -396,7 +397,7 @@ async def test_an_address_that_does_not_answer_leaves_time_for_others(resolved: 
     async with linked() as (transport, _):
         with contextlib.ExitStack() as sockets:
             silent = sockets.enter_context(socket.socket())
-            silent.bind(("127.0.0.2", transport._dialogues.line.address.port))
+            silent.bind(("127.0.0.2", transport.dialogues.line.address.port))
             silent.listen(0)
             for _ in range(3):
                 waiting = sockets.enter_context(socket.socket())

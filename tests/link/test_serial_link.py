@@ -25,6 +25,7 @@ from robotiq_async.link.serial.ports import (
     why_no_port,
 )
 from tests.link.scripted_device import SPOILT, Device, reopened, unopened, wrong_checksum
+from tests.link.writing import write_image
 from tests.serial_line import SerialLine, with_crc
 
 pytestmark = pytest.mark.virtual_time
@@ -34,7 +35,7 @@ async def test_read_and_write_use_the_addresses_of_the_serial_gripper(
     transport: ModbusTransport, device: Device
 ) -> None:
     assert await transport.read() == (5,) * 8, "after one that brings the line in step, and three after it"
-    await transport.write((0x0900, 0x0C00, 0, 0, 0, 0, 0, 0))
+    await write_image(transport, (0x0900, 0x0C00, 0, 0, 0, 0, 0, 0))
     probe, *short, read, write = device.requests
     assert probe == with_crc(bytes.fromhex("09 03 07d0 0001"))
     assert [each[:6] for each in short] == [bytes.fromhex(f"09 03 07d0 000{n}") for n in (2, 3, 4)]
@@ -50,11 +51,11 @@ async def test_late_replies_never_answer_a_later_request(
     await transport.read()
     device.keep = late
     with pytest.raises(ResponseTimeoutError):
-        await (transport.read() if first == "read" else transport.write((0,) * 8))
+        await (transport.read() if first == "read" else write_image(transport, (0,) * 8))
     await reopened(transport)
     for _ in range(3):
         assert await transport.read() == (len(device.requests),) * 8
-    await transport.write((0,) * 8)
+    await write_image(transport, (0,) * 8)
     assert await transport.read() == (len(device.requests),) * 8
 
 
@@ -80,7 +81,7 @@ async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(
         asked = len(device.requests)
         device.spoil = SPOILT[how]
         assert await transport.read() == (len(device.requests),) * 8, "the last request is answered"
-        assert transport.repeats == number
+        assert transport.dialogues.repeats == number
         first, probe, again = device.requests[asked:]
         assert first == again
         assert probe[:5] == first[:5], "a read, of the same registers"
@@ -93,10 +94,10 @@ async def test_a_write_is_never_sent_again(transport: ModbusTransport, device: D
     asked = len(device.requests)
     device.spoil = SPOILT[how]
     with pytest.raises(RobotiqConnectionError):
-        await transport.write((0x0900,) * 8)
+        await write_image(transport, (0x0900,) * 8)
     assert [request[1] for request in device.requests[asked:]] == [16]
     assert not transport.is_open
-    assert transport.repeats == 0
+    assert transport.dialogues.repeats == 0
 
 
 @pytest.mark.parametrize("spoilt", range(1, 3))

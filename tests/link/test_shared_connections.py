@@ -17,6 +17,7 @@ from robotiq_async.link.outcome import Silent
 from robotiq_async.link.serial.patience import SOON, LinePatience
 from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
 from tests.link.scripted_device import Device, reopened, unopened
+from tests.link.writing import write_image
 from tests.serial_line import with_crc
 from tests.virtual import until
 from tests.virtual_line import VirtualLine
@@ -54,7 +55,7 @@ async def test_a_late_reply_for_one_does_not_meet_a_write_of_the_other(pair: Pai
     await asyncio.sleep(0.051)
     assert device.requests
     device.late = {RIGHT: 0.01}
-    await right.write(IMAGE)
+    await write_image(right, IMAGE)
     await reading
     assert left.is_open
     assert right.is_open
@@ -73,7 +74,7 @@ async def test_the_rest_of_a_cancelled_exchange_does_not_meet_a_write_of_the_oth
     reading.cancel()
     await asyncio.wait([reading])
     assert not left.is_open
-    await right.write(IMAGE)
+    await write_image(right, IMAGE)
     assert right.is_open
 
 
@@ -93,7 +94,7 @@ async def test_who_is_cancelled_between_two_turns_takes_no_late_reply_for_a_late
     assert right.is_open, "the exchange of the other goes on"
     device.late, device.loses = {}, 1
     with pytest.raises(RobotiqConnectionError):
-        await left.write(IMAGE)
+        await write_image(left, IMAGE)
 
 
 async def test_a_silent_gripper_is_asked_now_and_then(pair: Pair, device: Device) -> None:
@@ -139,7 +140,7 @@ async def test_an_answer_that_is_too_late_costs_the_other_no_write(pair: Pair, d
     await asyncio.sleep(0.08)
     late = with_crc(bytes((LEFT, 3, 6, *range(6))))
     device.spoil = lambda _: late[:4]
-    writing = asyncio.create_task(right.write(IMAGE))
+    writing = asyncio.create_task(write_image(right, IMAGE))
     await until(lambda: device.requests[-1][:2] == bytes((RIGHT, 16)))
     device.send(late[4:] + with_crc(device.requests[-1][:6]))
     await writing
@@ -153,7 +154,7 @@ async def test_each_request_has_the_line_alone(pair: Pair, device: Device) -> No
     device.late |= {LEFT: 0.004, RIGHT: 0.006}
     loop = asyncio.get_running_loop()
     began = loop.time()
-    await asyncio.gather(left.read(), right.read(), left.write(IMAGE), right.write(IMAGE))
+    await asyncio.gather(left.read(), right.read(), write_image(left, IMAGE), write_image(right, IMAGE))
     assert [request[0] for request in device.requests] == [LEFT, RIGHT, LEFT, RIGHT]
     assert loop.time() - began == pytest.approx(0.02, abs=0.003)
 

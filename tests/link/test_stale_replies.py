@@ -25,6 +25,7 @@ from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from tests.link.scripted_device import request_size, unopened
+from tests.link.writing import write_image
 from tests.serial_line import with_crc
 from tests.virtual_line import VirtualLine
 
@@ -188,7 +189,7 @@ async def exchange_at_random(transport: ModbusTransport, unit: int, liar: Liar, 
                 assert answer is not None
                 registers = answer.registers
             else:
-                await transport.write((WRITTEN,) * 8)
+                await write_image(transport, (WRITTEN,) * 8)
                 continue
             assert registers[0] == liar.numbers[unit], "a stale status"
         await asyncio.sleep(0.005)

@@ -31,6 +31,7 @@ from robotiq_async.link.urcap.transport import UrcapTransport
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
+from tests.link.writing import write_image
 
 pytestmark = pytest.mark.virtual_time
 
@@ -239,7 +240,7 @@ async def test_a_motion_does_not_activate_a_gripper_that_another_client_has_rese
     async with linked() as (link, served):
         await link.read()
         served.values |= {"ACT": 0, "STA": 0}
-        await link.write(image(255))
+        await write_image(link, image(255))
         assert served.values["ACT"] == 0
         assert not (await status(link)).activation_echo
 
@@ -247,11 +248,11 @@ async def test_a_motion_does_not_activate_a_gripper_that_another_client_has_rese
 async def test_a_release_is_taken_back_by_the_next_write() -> None:
     async with linked() as (link, served):
         await link.read()
-        await link.write((0x3100, 0, 0, 0, 0, 0, 0, 0))
+        await write_image(link, (0x3100, 0, 0, 0, 0, 0, 0, 0))
         await link.read()
-        await link.write(image(0, go=False))
+        await write_image(link, image(0, go=False))
         assert served.lines[-1] == "SET ACT 1 GTO 0 ATR 0 SPE 50 FOR 60 POS 0"
-        await link.write(image(0, go=False))
+        await write_image(link, image(0, go=False))
         assert served.lines[-1] == "SET GTO 0 SPE 50 FOR 60 POS 0"
 
 
@@ -261,7 +262,7 @@ async def test_a_reset_is_in_the_line_although_the_gripper_shows_it() -> None:
         served.values |= {"ACT": 0, "STA": 0}
         for _ in range(2):
             await link.read()
-            await link.write(image(0, go=False, activate=False))
+            await write_image(link, image(0, go=False, activate=False))
             assert served.lines[-1] == "SET ACT 0 GTO 0 ATR 0 SPE 50 FOR 60 POS 0"
             await link.close()
             await link.open()
@@ -274,14 +275,14 @@ async def test_a_status_after_a_reset_has_no_old_activation() -> None:
         for _ in range(2):  # the next read would ask for STA, and not for ACT
             await link.read()
         served.answer = takes_nothing(served)
-        await link.write(image(7, go=False, activate=False))
+        await write_image(link, image(7, go=False, activate=False))
         served.values |= {"ACT": 1, "STA": 1}
         assert (await status(link)).activation_echo
 
 
 async def test_what_was_not_read_yet_is_set() -> None:
     async with linked() as (link, served):
-        await link.write(image(255))
+        await write_image(link, image(255))
         assert served.lines[-1] == "SET ACT 1 ATR 0 SPE 50 FOR 60 POS 255 GTO 1"
 
 
@@ -296,7 +297,7 @@ async def test_after_a_write_everything_is_read_until_the_echo_shows_it() -> Non
     async with linked() as (link, served):
         await link.read()
         served.answer = lambda line: b"ack" if line.startswith("SET") else served.good(line)
-        await link.write(image(255))
+        await write_image(link, image(255))
         for _ in range(3):
             served.lines.clear()
             await link.read()
@@ -311,11 +312,11 @@ async def test_after_a_write_everything_is_read_until_the_echo_shows_it() -> Non
 async def test_a_stream_of_positions_goes_on_with_the_short_read() -> None:
     async with linked() as (link, served):
         await link.read()
-        await link.write(image(100))
+        await write_image(link, image(100))
         await link.read()
         for position in (110, 120, 130):
             served.lines.clear()
-            await link.write(image(position))
+            await write_image(link, image(position))
             assert (await status(link)).echo == (True, True, position)
             assert len(served.lines) == 1 + 5
         served.lines.clear()
@@ -344,7 +345,7 @@ async def taking(
         served.values |= before
         await link.read()
         served.answer = takes_nothing(served)
-        await link.write(written)
+        await write_image(link, written)
         served.values |= taken
         yield link, served
 
@@ -406,7 +407,7 @@ async def test_a_command_of_a_lost_connection_that_acts_late_shows_whole() -> No
 
 async def test_the_second_of_two_commands_is_taken_half() -> None:
     async with taking({"GTO": 0, "PRE": 7}, MOVE, {}) as (link, served):
-        await link.write(HALT)
+        await write_image(link, HALT)
         served.values |= {"GTO": 0, "PRE": 200}
         assert (await status(link)).echo == (True, False, 7), "half of the first"
         served.values["GTO"] = 1
@@ -439,7 +440,7 @@ async def test_while_a_reset_is_taken_everything_shows(taken: dict[str, int], ec
 async def test_an_acknowledgement_may_have_an_end_of_line(said: bytes) -> None:
     async with linked() as (link, served):
         served.answer = lambda line: said if line.startswith("SET") else served.good(line)
-        await link.write(image(255))
+        await write_image(link, image(255))
         await link.read()
         served.writers[0].write(b"\n")
         await link.read()
@@ -490,7 +491,7 @@ async def test_a_write_that_is_not_acknowledged_is_in_doubt_and_not_repeated(sai
         served.lines.clear()
         served.answer = always(said)
         with pytest.raises(RobotiqConnectionError):
-            await link.write(image(255))
+            await write_image(link, image(255))
         assert not link.is_open
         assert len(served.lines) == 1
 
@@ -849,7 +850,7 @@ async def test_a_set_that_was_acknowledged_and_never_shows_is_lost_here() -> Non
         await link.read()
         served.answer = lambda line: b"ack" if line.startswith("SET") else served.good(line)
         loop = asyncio.get_running_loop()
-        await link.write(image(255))
+        await write_image(link, image(255))
         written = loop.time()
         with pytest.raises(
             ConnectionLostError, match="a SET was acknowledged, and its gripper has not shown it"
@@ -862,7 +863,7 @@ async def test_another_client_that_overrides_a_set_is_another_client() -> None:
     async with linked() as (link, served):
         await link.read()
         served.answer = lambda line: b"ack" if line.startswith("SET") else served.good(line)
-        await link.write(image(255))
+        await write_image(link, image(255))
         served.values["PRE"] = 80
         shown = await status(link)
         for _ in range(200):

@@ -49,7 +49,7 @@ def test_intervals_and_time_outs_of_a_line_and_of_a_network() -> None:
     def figures(address: str, **given: Any) -> tuple[float, float]:
         options = RobotiqHand(address, **given)._options
         transport: Any = options.make_transport()
-        return options.poll_interval, transport._dialogues._usual.seconds
+        return options.poll_interval, transport.dialogues._usual.seconds
 
     assert figures("tcp://192.168.1.11") == (0.005, 0.4)
     assert figures("tcp://192.168.1.11", response_timeout=5) == (0.005, 5.0)

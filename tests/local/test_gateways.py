@@ -130,6 +130,6 @@ async def test_the_socket_is_kept_alive(gateway: SimulatorServer) -> None:
         await asyncio.sleep(0)
         session = hand._session
         assert session is not None
-        wire = session.run._parts.link._dialogues.line._wire  # type: ignore[attr-defined]
+        wire = session.run._parts.link.dialogues.line._wire  # type: ignore[attr-defined]
         line: socket.socket = wire._client.ctx.transport.get_extra_info("socket")
         assert line.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)

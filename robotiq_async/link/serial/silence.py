@@ -28,15 +28,15 @@ class Silence:
 
     Attributes:
         heard: when the last bytes arrived, by the clock of the event loop.
-        short_s: seconds of the short silence.
-        is_long: whether this line needs the longer silence.
+        short_s: seconds of the short silence; 0 where this end keeps none, as a serial server keeps its own.
+        is_short: whether that has been enough so far.
     """
 
     def __init__(self, character_s: float) -> None:
-        """Begin with the short silence; a character takes ``character_s`` seconds on the line."""
+        """Begin with the short silence; a character takes ``character_s`` seconds, 0 for no silence."""
         self.short_s: Final = SHORT_CHARACTERS * character_s
         self.heard: float = -math.inf
-        self.is_long: bool = False
+        self.is_short: bool = character_s > 0
 
     def hear(self, now: float) -> None:
         """Bytes have arrived."""
@@ -44,20 +44,18 @@ class Silence:
 
     def lengthen(self) -> None:
         """This line needs the longer silence."""
-        self.is_long = True
+        self.is_short = False
 
     async def keep(self, clock: Callable[[], float], *, is_long: bool = False) -> None:
         """Wait until the line has been silent for long enough, or for the longer time; at once if it has.
 
         ``clock`` is that of the event loop (``clock_of``). uvloop's own ``time()`` counts whole milliseconds.
         """
-        until = self.heard + (max(LONG_S, self.short_s) if self.is_long or is_long else self.short_s)
-        if (left := until - clock()) <= 0:
-            return
-        if clock is not time.monotonic or IS_COARSE:
-            await asyncio.sleep(left)  # virtual time passes only in the loop, and its timers are exact
-            return
-        if left > TIMER_S:
-            await asyncio.sleep(left - TIMER_S)
-        while clock() < until:
+        until = self.heard + (self.short_s if self.is_short and not is_long else max(LONG_S, self.short_s))
+        left = until - clock()
+        # Virtual time passes only in the loop, and its timers are exact.
+        by_looking_s = 0.0 if clock is not time.monotonic or IS_COARSE else TIMER_S
+        if left > by_looking_s:
+            await asyncio.sleep(left - by_looking_s)
+        while by_looking_s and clock() < until:
             pass

@@ -44,7 +44,7 @@ from ...values.registers import Echo, Registers
 from ..address import Address
 from ..exchange import Dialogue, Exchange, Step, Timing
 from ..line import Line
-from ..outcome import Answer, Noise, Outcome, Silent
+from ..outcome import Answer, Noise, Silent, check
 from . import lines
 
 SHOWS_S: Final = 0.5
@@ -150,7 +150,7 @@ class UrcapTransport:
         self._gripper: Final = gripper
         self._connect_timeout: Final = connect_timeout
         self._timing: Final = Timing(response_timeout)
-        self._line: Final = Line(address, stray=lines.stray, log=log)
+        self._line: Final = Line(address, stray=lines.stray)
         self._unanswered = ""
         """The first question that has no answer; that of a connection that has ended, too."""
         self._unreadable = ""
@@ -193,7 +193,7 @@ class UrcapTransport:
         """
         if not (self._unreadable and self.is_open):
             await self.close()
-            await self._line.open(self, self._connect_timeout)
+            await self._line.open(self, self._connect_timeout, self._log)
         self._changes, self._lost_by = True, math.inf  # what was written last may still show
         self._values.clear()
         if not await self._line.talk(self, self._opening()):
@@ -219,10 +219,6 @@ class UrcapTransport:
         """
         return self._line.talk(self, self._writing(decide))
 
-    async def write(self, registers: Sequence[int]) -> None:
-        """Write the request registers."""
-        await self.send(lambda: registers)
-
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
         self._line.leave(self)
@@ -243,7 +239,7 @@ class UrcapTransport:
             if isinstance(outcome, Noise | Silent):
                 why = f"the URCap does not choose gripper {self._gripper}: {outcome.error}"
                 raise ConnectFailedError(str(self._address), why) from outcome.error
-            _check(outcome)
+            check(outcome)
         question = Questions([CURRENT], self._timing)
         outcome = yield question
         if isinstance(outcome, Noise | Silent):
@@ -270,7 +266,7 @@ class UrcapTransport:
 
     def _writing(self, decide: Callable[[], Sequence[int] | None]) -> Dialogue[bool]:
         """Write what is decided; return whether there was anything."""
-        _check((yield Step.READY))
+        check((yield Step.READY))
         if (image := decide()) is None:
             return False
         act, go, position = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
@@ -281,7 +277,7 @@ class UrcapTransport:
             self._written = self._sent[-1]
         shown = None if self._releases else self._values.get("ACT")
         self._releases = bool(reg.rATR.read(image))
-        _check((yield UrcapSetting(lines.command(image, shown), self._timing)))
+        check((yield UrcapSetting(lines.command(image, shown), self._timing)))
         self._lost_by = min(self._lost_by, self._line.now() + LOST_S)
         return True
 
@@ -342,7 +338,7 @@ class UrcapTransport:
         self._unanswered = names[0]
         outcome = yield questions
         self._unanswered = questions.unanswered
-        _check(outcome)
+        check(outcome)
         found = zip(names, questions.values, strict=True)  # ACT and GTO twice, and readable once perhaps
         self._unreadable = next((name for name, value in found if value == lines.UNREADABLE), "")
         if self._unreadable:
@@ -350,9 +346,3 @@ class UrcapTransport:
         values = [int(value) for value in questions.values]
         self._values.update(zip(names, values, strict=True))
         return values
-
-
-def _check(came_to: Answer | None) -> None:
-    """Raise what a step came to, if that is no answer: it closes the connection."""
-    if isinstance(came_to, Outcome):
-        raise came_to.error

@@ -212,7 +212,7 @@ def report_adapter(address: Address, report: ReportFinding, folder: Path = USB_S
 
 def report_damage(link: Link, reads: int, report: ReportFinding) -> None:
     """Report reads that had to be repeated."""
-    repeats = link.repeats if isinstance(link, ModbusTransport) else 0
+    repeats = link.dialogues.repeats if isinstance(link, ModbusTransport) else 0
     if repeats:
         found = f"{repeats} of {reads} reads had to be repeated: answers get lost or damaged"
         advice = "Check cable, shield, ground and termination; a few are usual with USB adapters."

@@ -63,7 +63,7 @@ async def _read(bench: Bench) -> None:
 
 
 def _repeats(bench: Bench) -> int:
-    return bench.link.link.repeats if isinstance(bench.link.link, ModbusTransport) else 0
+    return bench.link.link.dialogues.repeats if isinstance(bench.link.link, ModbusTransport) else 0
 
 
 async def _command(bench: Bench) -> None:
