@@ -50,9 +50,10 @@ class Poller:
         link, self._controller, self._counters, self._publisher, options = parts
         self._link: Final = link
         self._cyclic: Final = link if isinstance(link, CyclicLink) else None
-        self._line: Final = link if isinstance(link, SharedLink) else None
-        self._model: Final = options.model
         self._is_slow: Final = options.link.is_slow
+        # A line that is not slow is nobody else's.
+        self._line: Final = link if self._is_slow and isinstance(link, SharedLink) else None
+        self._model: Final = options.model
         self._stroke: Final = options.units.stroke
         self.tick: Final = Tick(options.poll_interval)
         self._log: Final = options.log

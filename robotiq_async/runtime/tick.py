@@ -42,8 +42,8 @@ class Tick:
         interval: seconds between ticks; longer than requested if the clock's step is too coarse.
         time: the clock of the deadlines.
         due: the next deadline.
-        late: the longest delay in seconds of the ticks that ended the last wait. A delay within a step of the
-            clock counts as none.
+        late: the longest delay in seconds of the ticks that have passed since the last wait. A delay within a
+            step of the clock counts as none.
         longest_late: the longest delay so far.
         held_up_at: the time of the last tick that was so late that the loop was held up before it.
     """
@@ -58,7 +58,6 @@ class Tick:
         self.late: float = 0.0
         self.longest_late: float = 0.0
         self.held_up_at: float = -math.inf
-        self._late = 0.0  # the longest delay since the last wait
         self._passed = 0
         self._hurried = False
         self._waiter: asyncio.Future[None] | None = None
@@ -69,7 +68,7 @@ class Tick:
         self._timer = timer = _LoopTimer.of(self._loop)
         phase = self.interval * timer.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
-        self._passed, self._hurried, self._late = 0, False, 0.0
+        self._passed, self._hurried = 0, False
         timer.add(self)
 
     def close(self) -> None:
@@ -103,16 +102,17 @@ class Tick:
             await self._waiter
             self._waiter = None
         passed, self._passed, self._hurried = self._passed, 0, False
-        self.late, self._late = self._late, 0.0
         return passed
 
     def expire(self, now: float) -> None:
         """Count the deadline, and any further ones, that have passed; set the next."""
         passed = now - self.due
-        if passed - self._step > self._late:
-            self._late = passed - self._step
-            self.longest_late = max(self.longest_late, self._late)
-        if passed - self._step > HELD_S:
+        late = passed - self._step
+        if late > self.late or not self._passed:
+            self.late = late
+        if late > self.longest_late:
+            self.longest_late = late
+        if late > HELD_S:
             self.held_up_at = now
         count = 1 + int(passed / self.interval)
         self.due += count * self.interval
