@@ -39,7 +39,8 @@ class Member:
         is_there: whether an agent serves it now.
         agents: number of agents that serve it; more than 1 is a mistake.
         state: of the agent's hand; None before the first summary.
-        fault: the fault that the gripper reports; None if unknown.
+        model: name of the gripper's model, which a newer agent may know alone; empty before that.
+        fault: the fault that the gripper reports; None if unknown, as with an unknown model.
         is_moving: whether an axis moves.
         holder: label of the client that commands it; None if no client does.
         inhibited: why motion is refused, and who has stopped it; empty if it is permitted.
@@ -54,6 +55,7 @@ class Member:
     is_there: bool = False
     agents: int = 0
     state: State | None = None
+    model: str = ""
     fault: Fault | None = None
     is_moving: bool = False
     holder: str | None = None
@@ -301,12 +303,14 @@ class Summaries:
             # The name in the payload, not in the key: zenoh may deliver under a wrong one.
             name = GripperName.of_key(f"{fields['to']}/summary")
             stamp, age, fault = float(fields["stamp"]), fields["age"], fields["fault"]
+            model = MODELS.get(name_of_model := words(fields["model"]))
             seen = stamp if age is None else stamp - float(age)
             if not math.isfinite(seen):
                 raise ValueError(f"not a time: {stamp}, {age}")
             what = {
                 "state": State[fields["state"]],
-                "fault": None if fault is None else MODELS[fields["model"]].fault(fault),
+                "model": name_of_model,
+                "fault": None if fault is None or model is None else model.fault(fault),
                 "is_moving": bool(fields["is_moving"]),
                 "holder": None if fields["holder"] is None else words(fields["holder"]),
                 "inhibited": _inhibited(fields),

@@ -275,6 +275,7 @@ def summary(of: GripperName) -> Figures:
         "stamp": time.monotonic(),
         "age": 0.001,
         "address": "tcp://192.168.1.11:502",
+        "model": "3f",
         "state": State.RUNNING_IDLE.name,
         "fault": 0,
         "is_moving": False,

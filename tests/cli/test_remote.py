@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import Finger
+from robotiq_async import Finger, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 from tests.cli.terminal import Terminal
@@ -22,9 +22,12 @@ from tests.cli.terminal import Terminal
 pytest.importorskip("zenoh")
 import zenoh
 
+from robotiq_async.cli.commands.fleet import _print_row
 from robotiq_async.cli.keys.issuing import issue, make_authority
+from robotiq_async.fleet.fleet import Member
 from robotiq_async.fleet.keys.access import Role
 from robotiq_async.fleet.network.configuration import session_configuration
+from robotiq_async.fleet.wire.names import GripperName
 from tests.fleet.sessions import free_port
 from tests.grippers import until
 from tests.patience import patience
@@ -169,7 +172,8 @@ def test_nothing_answers(call: Call, endpoint: str) -> None:
 async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: Served) -> None:
     listed = await shell.run("fleet", "--json")
     listed.assert_succeeded()
-    assert json.loads(listed.out)["address"] == ADDRESS
+    row = json.loads(listed.out)
+    assert (row["address"], row["model"], row["fault"]) == (ADDRESS, "3f", "NONE")
     moving = await shell.start("move", "255", "--yes", "--speed", "0", ADDRESS)
     await gripper.moves()
     halted = await shell.run("fleet", "halt", "lab")
@@ -183,6 +187,13 @@ async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: Served) 
     permitted = await shell.run("fleet", "permit", "--yes", ADDRESS)
     permitted.assert_succeeded()
     assert permitted.out.startswith(f"{ADDRESS}  permitted; motion is inhibited: fleet halt")
+
+
+def test_a_list_has_a_gripper_of_a_model_that_is_unknown_here(capsys: pytest.CaptureFixture[str]) -> None:
+    _print_row(Member(GripperName.parse(ADDRESS), True, 1, State.FAULT, "5f"))
+    name, state, fault, _, _, *words = capsys.readouterr().out.split()
+    assert (name, state, fault) == (ADDRESS, "FAULT", "?")
+    assert " ".join(words) == "the model '5f' is unknown here: update robotiq_async"
 
 
 async def test_a_yes_permits_the_gripper_and_the_halt_that_the_question_shows(

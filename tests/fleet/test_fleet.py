@@ -76,6 +76,7 @@ def test_an_overtaken_summary_is_dropped_and_each_run_has_its_own_clock() -> Non
         summary(1.0, to="robotiq/v1/*/*/*"),
         summary(1.0, to=3),
         summary(1.0, holder=3),
+        summary(1.0, model=None),
         summary(1.0, epoch="?"),
         b"[" * 3000,
     ],
@@ -83,6 +84,14 @@ def test_an_overtaken_summary_is_dropped_and_each_run_has_its_own_clock() -> Non
 def test_malformed_summaries_are_refused(payload: bytes) -> None:
     with pytest.raises(ProtocolError, match="a summary that cannot be read"):
         Summaries().read(payload, 1.0)
+
+
+@pytest.mark.parametrize("fault", [None, 0, 14])
+def test_of_a_model_that_is_unknown_here_the_state_is_known(fault: int | None) -> None:
+    """The fault of a code depends on the model. Such a gripper was not to be seen at all."""
+    read = Summaries().read(summary(1.0, model="5f\n", fault=fault, state="FAULT"), 1.0)
+    assert read is not None
+    assert (read[1]["model"], read[1]["state"], read[1]["fault"]) == ("5f\\n", State.FAULT, None)
 
 
 @inside(lab)

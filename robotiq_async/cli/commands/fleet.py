@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from ...runtime import now, printable
 from ...tools.wording import inhibit_shown
-from ...values import RobotiqError
+from ...values import MODELS, RobotiqError
 from ..arguments import Flag, Yes, need
 from ..consent import consent, screen_to_ask_at
 from ..failures import CommandError, UsageError, normal_end, usage
@@ -162,9 +162,11 @@ async def _watch(seen: Fleet, show: Callable[[Member], None]) -> None:
 
 def _print_row(member: Member) -> None:
     state = "gone" if not member.is_there else "?" if member.state is None else member.state.name
-    fault = "-" if not member.fault else member.fault.name
+    is_unknown = bool(member.model) and member.model not in MODELS  # that of a newer agent
+    fault = "?" if is_unknown else "-" if not member.fault else member.fault.name
     problem = f"{member.agents} AGENTS  " * (member.agents > 1)
-    problem += "; ".join(filter(None, (member.inhibited, member.problem)))
+    model = f"the model {member.model!r} is unknown here: update robotiq_async" if is_unknown else ""
+    problem += "; ".join(filter(None, (member.inhibited, member.problem, model)))
     age = "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"
     words = f"{age} {problem}".rstrip()
     row = _ROW_FORMAT.format(str(member.name), state, fault, member.holder or "-", words)
@@ -177,6 +179,7 @@ def _print_object(member: Member) -> None:
         "is_there": member.is_there,
         "agents": member.agents,
         "state": None if member.state is None else member.state.name,
+        "model": member.model or None,
         "fault": None if member.fault is None else member.fault.name,
         "fault_code": None if member.fault is None else int(member.fault),
         "is_moving": member.is_moving,
