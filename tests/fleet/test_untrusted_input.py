@@ -103,6 +103,27 @@ async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing(
     assert here.gripper.position(Finger.A) < 10
 
 
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [(f"set_{what}", "value") for what in ("position", "speed", "force")]
+    + [("move", "position"), ("command", "axes")],
+)
+@inside(lab)
+async def test_a_command_without_its_argument_is_refused_before_it_is_a_job(
+    here: Lab, hand: RemoteHand, name: str, missing: str
+) -> None:
+    """It raised in its task: then it was a job of the lease, in the words of Python about a function."""
+    assert hand._session is not None
+    fingers = {} if name == "command" else {"fingers": 1}
+    call = hand._session.dialog.call(fingers)
+    answer = await here.answer(f"cmd/{name}", call.pack())
+    assert answer.begun is False
+    with pytest.raises(TypeError, match=f"^{name} needs {missing}$"):
+        answer.outcome(RobotiqStatus.from_raw)
+    assert here.agent.hands["left"]._jobs.find(call) is None
+    await hand.move(20, 1)
+
+
 @inside(lab)
 async def test_arguments_that_do_not_fit_leave_nothing_behind(here: Lab, hand: RemoteHand) -> None:
     """The axes counted as commanded, and what others had set going was held at the end of the lease."""
