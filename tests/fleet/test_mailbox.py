@@ -107,7 +107,7 @@ async def test_letters_of_another_thread() -> None:
 
     thread = threading.Thread(target=work)
     thread.start()
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(patience(PATIENCE_S)):
         await there.wait()
     thread.join()
     assert postman.opened == list(range(1000))
@@ -184,7 +184,7 @@ def test_a_client_that_does_not_read_delays_no_other_and_excess_replies_are_drop
     """A dropped question is reported to its client, as slow as an answer: it held up the loop."""
     reply_sender, read = ReplySender(), threading.Event()
     sent, dropped_in = list[int](), set[threading.Thread]()
-    reply_sender.put(lambda: (read.wait(PATIENCE_S), None)[1], lambda: None)
+    reply_sender.put(lambda: (read.wait(patience(PATIENCE_S)), None)[1], lambda: None)
     for number in range(2 * MOST_REPLIES):
         reply_sender.put(
             lambda number=number: sent.append(number),  # type: ignore[misc]

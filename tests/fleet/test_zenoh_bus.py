@@ -14,6 +14,7 @@ import zenoh
 from robotiq_async.fleet.network.bus import MessageKind, Query, Urgency
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus
 from tests.fleet.lab import LEFT
+from tests.patience import patience
 
 PATIENCE_S = 10.0
 KEYS = {
@@ -59,7 +60,7 @@ class Asked:
 
     def reply(self, _key: str, _payload: bytes, **_: object) -> None:
         self.replies.set()
-        self.is_read.wait(6 * PATIENCE_S)
+        self.is_read.wait(6 * patience(PATIENCE_S))
 
 
 @asynccontextmanager
@@ -89,7 +90,7 @@ async def test_a_client_that_does_not_read_the_answers_to_its_questions_delays_n
         try:
             for verb, each in asked.items():  # each sticks, and the next class goes on
                 session.served[KEYS[verb]](each)
-                async with asyncio.timeout(PATIENCE_S):
+                async with asyncio.timeout(patience(PATIENCE_S)):
                     while not each.replies.is_set():  # noqa: ASYNC110
                         await asyncio.sleep(0.001)
         finally:
