@@ -85,7 +85,7 @@ def milliseconds(times: list[float]) -> Figures:
 async def agent(endpoint: str, *ports: str) -> None:
     """An agent that serves so many hands."""
     hands = hands_at(ports)
-    bus = await open_bus(agent_configuration("bench", "host", [endpoint]), endpoint)
+    bus = await open_bus(agent_configuration("bench", "host", hands, [endpoint]), endpoint)
     served = Agent("bench", "host", hands, bus)
     serving = asyncio.create_task(served.run())
     await active(hands)
@@ -228,7 +228,7 @@ async def commands(hand: Hand, more: Callable[[], Figures] = dict) -> None:
 
 async def generator(endpoint: str, count: str) -> None:
     """Statuses of so many grippers, 200 times a second each."""
-    bus = await open_bus(agent_configuration("bench", "generator", [endpoint]), endpoint)
+    bus = await open_bus(agent_configuration("bench", "generator", (), [endpoint]), endpoint)
     names = [name(n, "generator") for n in range(int(count))]
     publishers = [bus.publisher(each.key("feed"), Urgency.TELEMETRY) for each in names]
     bus.serve(f"{names[0].base.rpartition('/')[0]}/*/info/*", describe)
@@ -287,7 +287,7 @@ def summary(of: GripperName) -> Figures:
 
 async def summaries(endpoint: str, count: str) -> None:
     """Summaries of so many grippers, once a second each."""
-    bus = await open_bus(agent_configuration("bench", "generator", [endpoint]), endpoint)
+    bus = await open_bus(agent_configuration("bench", "generator", (), [endpoint]), endpoint)
     names = [name(n, "generator") for n in range(int(count))]
     publishers = [bus.publisher(each.key("summary"), Urgency.TELEMETRY) for each in names]
     tokens = [bus.announce(each.key("alive", "1")) for each in names]

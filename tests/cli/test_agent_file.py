@@ -85,8 +85,8 @@ def test_behind_a_router_it_does_not_listen(tmp_path: Path) -> None:
     """Zenoh's routers carry nothing between two who may listen: no client heard of it."""
     settings = read(tmp_path, f'connect = ["tcp/127.0.0.1:7447"]\n{GOOD}')
     assert (settings.listen, settings.connect) == ((), ("tcp/127.0.0.1:7447",))
-    assert agent_configuration("lab", "cell", settings.listen, settings.connect)["mode"] == "client"
-    assert agent_configuration("lab", "cell")["mode"] == "peer"
+    assert agent_configuration("lab", "cell", ["left"], settings.listen, settings.connect)["mode"] == "client"
+    assert agent_configuration("lab", "cell", ["left"])["mode"] == "peer"
     both = 'connect = ["tcp/127.0.0.1:7447"]\nlisten = ["tcp/127.0.0.1:7448"]\n'
     words = r"line 2: listen and connect cannot be combined.*through a router.*7448"
     with pytest.raises(AgentFileError, match=words):

@@ -26,7 +26,7 @@ async def agent_of_the_pages() -> AsyncIterator[dict[str, str]]:
         reserved.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{reserved.getsockname()[1]}"
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        bus = await open_bus(agent_configuration("lab", "cell-1", [endpoint]), endpoint)
+        bus = await open_bus(agent_configuration("lab", "cell-1", ["left"], [endpoint]), endpoint)
         agent = Agent("lab", "cell-1", {"left": RobotiqHand(server.address)}, bus)
         ready = asyncio.Event()
         serving = asyncio.create_task(agent.run(ready.set))

@@ -1,8 +1,10 @@
 """An operator beside a flood: what it gets done, the time of a halt, and whether its lease lasts.
 
 ``python -m tests.fleet.flood [SECONDS] [KIND...]``. A gripper, its agent, an operator and a flooder, each a
-process. In every second block of BLOCK_S the flood goes to the operator's agent, and in the others to another
-agent of this machine: so what the flood itself takes, and what else happens here, is in both.
+process. Blocks of BLOCK_S take turns: the flood goes to another agent of this machine, to the operator's own,
+to nobody. The machine has the same work with another agent and with its own: their ratio is what the flood
+takes from the operator. The ratio to nobody also has what the flooder and its target take of the two cores,
+which on another host they would not.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ from tests.grippers import active_gripper
 
 FLOOD: Final = "tests.fleet.flood"
 BLOCK_S: Final = 2.0
+GOALS: Final = ("another", "its own", "nobody")
+"""Agents that are flooded, in turn."""
 HALT_EVERY_S: Final = 0.1
 TICK_S: Final = 0.01
 WAIT_S: Final = 0.3
@@ -54,8 +58,9 @@ KINDS: Final[dict[str, tuple[bool, int, Callable[[int], str], dict[str, Any]]]] 
 }
 
 
-def is_flooded(at: float, begun: float) -> bool:
-    return int((at - begun) / BLOCK_S) % 2 == 1
+def goal(at: float, begun: float) -> str:
+    """Where the flood goes."""
+    return GOALS[int((at - begun) / BLOCK_S) % len(GOALS)]
 
 
 async def gripper() -> None:
@@ -66,7 +71,7 @@ async def gripper() -> None:
 
 async def agent(endpoint: str, address: str, keys: str) -> None:
     folder = Path(keys) / "agent-cell" if keys else None
-    bus = await open_bus(agent_configuration("lab", "cell", [endpoint], keys=folder), endpoint)
+    bus = await open_bus(agent_configuration("lab", "cell", ["left"], [endpoint], keys=folder), endpoint)
     served = Agent("lab", "cell", {"left": RobotiqHand(address)}, bus, records=file_records())
     await served.run(lambda: say("ready"))
 
@@ -111,16 +116,18 @@ async def flooder(endpoint: str, other: str, keys: str, kind: str, begun: str, s
     _, rate, key, arguments = KINDS[kind]
     folder = Path(keys) / "read-alice" if keys else None
     buses = [await open_bus(client_configuration([each], keys=folder), each) for each in (other, endpoint)]
+    of_goal = dict(zip(GOALS, buses, strict=False))
     start, until, sent, due = float(begun), float(begun) + float(seconds), 0, 0.0
     say("ready")
     while (now := time.monotonic()) < until:
-        bus = buses[is_flooded(now, start)]
-        due += rate * TICK_S if now > start else 0.0
-        for _ in range(int(due)):
-            sent += 1
-            call = AgentCall(LEFT.base, f"x{sent}", number=sent, arguments=arguments)
-            bus.ask(key(sent), call.pack(), timeout=WAIT_S, urgency=Urgency.COMMAND)
-        due -= int(due)
+        bus = of_goal.get(goal(now, start))
+        if bus is not None and now > start:
+            due += rate * TICK_S
+            for _ in range(int(due)):
+                sent += 1
+                call = AgentCall(LEFT.base, f"x{sent}", number=sent, arguments=arguments)
+                bus.ask(key(sent), call.pack(), timeout=WAIT_S, urgency=Urgency.COMMAND)
+            due -= int(due)
         await asyncio.sleep(max(0.0, now + TICK_S - time.monotonic()))
     for bus in buses:
         await bus.close()
@@ -169,25 +176,23 @@ async def flood(kind: str, seconds: float) -> dict[str, Any]:
                 if process.returncode is None:
                     process.kill()
                     await process.wait()
-    return {"kind": kind, "asked/s": round(sent / seconds), **judged(said)}
+    return {"kind": kind, "asked/s": round(sent / seconds * len(GOALS) / 2), **judged(said)}
 
 
 def judged(said: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {"leases lost": said["lost"]}
-    for where, flooded in (("without", False), ("with", True)):
-        those = [call for call in said["calls"] if is_flooded(call[0], 0.0) is flooded]
-        found[f"outcomes {where}"] = dict(Counter(outcome for *_, outcome in those))
+    done: dict[str, int] = {}
+    for where in GOALS:
+        those = [call for call in said["calls"] if goal(call[0], 0.0) == where]
+        found[f"outcomes, {where}"] = dict(Counter(outcome for *_, outcome in those))
         for what in ("set_speed", "halt"):
             took = sorted(seconds for _, name, seconds, _ in those if name == what) or [0.0]
             p50, p99 = (round(1000 * took[int(len(took) * share)], 1) for share in (0.5, 0.99))
-            found[f"{what} {where}: calls, p50, p99, max ms"] = (
-                len(took),
-                p50,
-                p99,
-                round(1000 * took[-1], 1),
-            )
-    with_it, without = (found[f"set_speed {w}: calls, p50, p99, max ms"][0] for w in ("with", "without"))
-    return {**found, "share": round(with_it / without, 2)}
+            most = round(1000 * took[-1], 1)
+            found[f"{what}, {where}: calls, p50, p99, max ms"] = (len(took), p50, p99, most)
+        done[where] = sum(name == "set_speed" for _, name, *_ in those)
+    shares = {where: round(done["its own"] / done[where], 2) for where in ("another", "nobody")}
+    return {**found, "share of that with another, with nobody": [*shares.values()]}
 
 
 ROLES = {"gripper": gripper, "agent": agent, "operator": operator, "flooder": flooder}

@@ -50,7 +50,7 @@ async def agent(endpoint: str, *addresses: str, router: str = "", poll_interval:
         for name, address in zip(NAMES, addresses, strict=False)
     }
     listen, connect = ([], [router]) if router else ([endpoint], [])
-    bus = await open_bus(agent_configuration("lab", "cell", listen, connect, insecure=True), endpoint)
+    bus = await open_bus(agent_configuration("lab", "cell", hands, listen, connect, insecure=True), endpoint)
     served = Agent("lab", "cell", hands, bus, records=file_records())
     serving = asyncio.ensure_future(served.run(lambda: say("ready")))
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, serving.cancel)

@@ -23,6 +23,7 @@ from robotiq_async.fleet.network.configuration import (
 )
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from tests.fleet.lab import LEFT, serving
+from tests.patience import patience
 
 TELEMETRY: Final = b"news"
 PATIENCE: Final = 10.0
@@ -46,7 +47,9 @@ class Client:
     async def may(self, *parts: str) -> bool:
         """Whether a request is answered."""
         query = LEFT.question(self.bus.who or "nobody") if parts == ("info",) else LEFT.key(*parts)
-        return await self.bus.ask(query, b"?", timeout=PATIENCE, urgency=Urgency.COMMAND) is not None
+        return (
+            await self.bus.ask(query, b"?", timeout=patience(PATIENCE), urgency=Urgency.COMMAND) is not None
+        )
 
     def subscribe(self, expression: str) -> asyncio.Event:
         """Set when something comes."""
@@ -85,7 +88,7 @@ class Line:
         return bus
 
     async def agent_bus(self, keys: Path | None = None) -> ZenohBus:
-        return await self.open(agent_configuration("lab", "cell", [self.endpoint], keys=keys))
+        return await self.open(agent_configuration("lab", "cell", ["left"], [self.endpoint], keys=keys))
 
     async def answering(self, keys: Path) -> Answering:
         """The agent's side."""
@@ -140,7 +143,7 @@ class Line:
 
 @asynccontextmanager
 async def line(
-    host: str = "127.0.0.1", protocol: str = "tls", patience: float = PATIENCE
+    host: str = "127.0.0.1", protocol: str = "tls", seconds: float = PATIENCE
 ) -> AsyncIterator[Line]:
-    async with AsyncExitStack() as stack, asyncio.timeout(patience):
+    async with AsyncExitStack() as stack, asyncio.timeout(patience(seconds)):
         yield Line(f"{protocol}/{host}:{free_port()}", stack)

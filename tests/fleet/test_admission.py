@@ -19,6 +19,7 @@ from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentCall
 from tests.fleet.lab import LEFT, Lab, lab
+from tests.fleet.network import MemoryBus
 from tests.virtual import inside
 
 BASE, EPOCH = "robotiq/v1/lab/cell/left", 77
@@ -302,6 +303,15 @@ def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixt
         for _ in range(FLOOD):
             questions.sort("")
     assert caplog.text.count("a request for information was dropped: a client sends too many") == 2
+
+
+@inside(lab)
+async def test_questions_about_grippers_that_it_does_not_serve_do_not_reach_the_agent(here: Lab) -> None:
+    """A flood about each of the agent's own has a limit in zenoh, and one about others would have none."""
+    bus = here.agent._bus
+    assert isinstance(bus, MemoryBus)
+    asked = {expression for expression, _ in bus.queryables if "/info" in expression}
+    assert asked == {LEFT.key("info"), LEFT.key("info", "*")}
 
 
 @inside(lab)

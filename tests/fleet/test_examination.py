@@ -341,7 +341,7 @@ async def test_each_role_over_zenoh(authority: Path, tmp_path: Path) -> None:
     make_authority(tmp_path)
     stranger = issue(tmp_path, "bob", Role.OPERATE)
     folders = [authority / "operate-bob", authority / "read-alice", stranger]
-    async with line(patience=60) as here, SimulatorServer() as server:
+    async with line(seconds=60) as here, SimulatorServer() as server:
         await here.serve(RobotiqHand(server.address), authority / "agent-cell")
         operator, reader, refused = await asyncio.gather(
             *(findings(f"{LEFT}?connect={here.endpoint}&keys={folder}") for folder in folders)

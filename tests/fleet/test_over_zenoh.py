@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, nullcontext
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,8 +22,9 @@ from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.keys.access import CLIENTS, AccessList, Role, access_control, rights
 from robotiq_async.fleet.keys.key_folder import ACCESS
 from robotiq_async.fleet.network import zenoh_bus
-from robotiq_async.fleet.network.bus import Urgency
+from robotiq_async.fleet.network.bus import MessageKind, Urgency
 from robotiq_async.fleet.network.configuration import (
+    QUESTIONS_HZ,
     agent_configuration,
     client_configuration,
     router_configuration,
@@ -31,11 +33,14 @@ from robotiq_async.fleet.network.configuration import (
 from robotiq_async.fleet.network.route import Route
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.runtime import now
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.values.errors import ConnectFailedError
 from tests.fleet.lab import LEFT
 from tests.fleet.sessions import PATIENCE, Client, Line, free_port, line
 from tests.grippers import active_gripper
+from tests.patience import patience
 
 ONE = f"{LEFT.base}/*"
 FLEET = "robotiq/v1/lab/*/*/summary"
@@ -76,7 +81,7 @@ async def test_each_role_watches_and_does_what_it_may(
         one, fleet = client.subscribe(ONE), client.subscribe(FLEET)
         await client.watch("robotiq/v1/lab/*/*/alive/*").wait()
         await client.watch("robotiq/v1/*/*/*/alive/*").wait()
-        assert await client.bus.announced("robotiq/v1/lab/*/*/alive/*", timeout=5.0) == [
+        assert await client.bus.announced("robotiq/v1/lab/*/*/alive/*", timeout=patience(PATIENCE)) == [
             LEFT.key("alive", "77")
         ]
         assert await client.may("info")
@@ -229,7 +234,7 @@ def test_every_right_has_its_rule_and_what_is_not_allowed_is_denied() -> None:
 
 def test_an_agent_with_keys_needs_an_access_list(keys: Path) -> None:
     with pytest.raises(ValueError, match=r"access\.toml: No such file"):
-        agent_configuration("lab", "cell", ["tls/127.0.0.1:7447"], keys=keys / "operate-bob")
+        agent_configuration("lab", "cell", ["left"], ["tls/127.0.0.1:7447"], keys=keys / "operate-bob")
 
 
 def test_clients_connect_encrypted_or_on_this_machine(keys: Path) -> None:
@@ -251,12 +256,12 @@ def test_clients_connect_encrypted_or_on_this_machine(keys: Path) -> None:
 @asynccontextmanager
 async def served(keys: Path) -> AsyncIterator[str]:
     """An agent with a simulated gripper; gives the endpoint it listens on."""
-    async with line(patience=3 * PATIENCE) as here:
+    async with line(seconds=3 * PATIENCE) as here:
         await here.serve(RobotiqHand("sim://"), keys / "agent-cell")
         yield here.endpoint
 
 
-def hand(endpoint: str, folder: Path, connect_timeout: float = PATIENCE) -> RemoteHand:
+def hand(endpoint: str, folder: Path, connect_timeout: float = 60.0) -> RemoteHand:
     address = f"{LEFT}?connect={endpoint}&keys={folder}"
     return RemoteHand(address, control=False, connect_timeout=connect_timeout)
 
@@ -291,7 +296,7 @@ async def behind_a_router(here: Line, keys: Path, rules: dict[str, object], *, t
     await here.open(rules)
     cell, router = keys / "agent-cell", [here.endpoint]
     bus = await here.open(
-        agent_configuration("lab", "cell", [], router, keys=cell, trusts_router=trusts_router)
+        agent_configuration("lab", "cell", ["left"], [], router, keys=cell, trusts_router=trusts_router)
     )
     await here.serve_over(bus, RobotiqHand("sim://"))
 
@@ -299,7 +304,9 @@ async def behind_a_router(here: Line, keys: Path, rules: dict[str, object], *, t
 async def trusting(here: Line, keys: Path, host: str, *answers_for: str) -> ZenohBus:
     """The agent of a host, with no rules of its own, that answers to the keys of some hosts."""
     own, router = keys / f"agent-{host}", [here.endpoint]
-    bus = await here.open(agent_configuration("lab", host, [], router, keys=own, trusts_router=True))
+    bus = await here.open(
+        agent_configuration("lab", host, ["left"], [], router, keys=own, trusts_router=True)
+    )
     for each in answers_for:
         for verb in ("info/*", "lease", "halt", "cmd/*"):
             here.stack.callback(bus.serve(f"robotiq/v1/lab/{each}/*/{verb}", lambda query: query.reply(b"!")))
@@ -309,7 +316,7 @@ async def trusting(here: Line, keys: Path, host: str, *answers_for: str) -> Zeno
 
 async def test_behind_a_router_that_is_trusted_the_rules_are_the_routers(keys: Path) -> None:
     """The agent sees the router's certificate alone: each client has its role all the same."""
-    async with line(patience=3 * PATIENCE) as here:
+    async with line(seconds=3 * PATIENCE) as here:
         rules = router_configuration("lab", ["cell"], [here.endpoint], keys / "agent-gate")
         await behind_a_router(here, keys, rules, trusts_router=True)
         async with hand(here.endpoint, keys / "operate-bob") as bob:
@@ -327,13 +334,13 @@ async def test_behind_a_router_that_is_trusted_the_rules_are_the_routers(keys: P
         assert [await eve.may(verb) for verb in ("info", "halt", "lease")] == [False] * 3
         for client, is_its_own in ((own, True), (alice, False)):
             question = LEFT.question("operate:bob")
-            reply = await client.bus.ask(question, b"?", timeout=1.0, urgency=Urgency.COMMAND)
+            reply = await client.bus.ask(question, b"?", timeout=patience(PATIENCE), urgency=Urgency.COMMAND)
             assert (reply is not None) is is_its_own
 
 
 async def test_an_agent_keeps_its_rules_behind_a_router_that_it_does_not_trust(keys: Path) -> None:
     """A reader, a client that is not in the list, and one without keys took control."""
-    async with line(patience=3 * PATIENCE) as here:
+    async with line(seconds=3 * PATIENCE) as here:
         unencrypted = f"tcp/127.0.0.1:{free_port()}"
         router = session_configuration([here.endpoint, unencrypted], (), keys / "agent-gate")
         await behind_a_router(here, keys, router | {"mode": "router"}, trusts_router=False)
@@ -342,7 +349,9 @@ async def test_an_agent_keeps_its_rules_behind_a_router_that_it_does_not_trust(k
         clients.append(Client(await here.open(session_configuration([], [unencrypted]))))
         for client in clients:
             await client.watch("robotiq/v1/lab/other/*/alive/*").wait()
-            assert await client.bus.ask(f"{OTHER}/halt", b"?", timeout=PATIENCE, urgency=Urgency.COMMAND)
+            assert await client.bus.ask(
+                f"{OTHER}/halt", b"?", timeout=patience(PATIENCE), urgency=Urgency.COMMAND
+            )
             assert not any([await client.may(verb) for verb in ("info", "halt", "lease", "cmd/hold")])
 
 
@@ -354,13 +363,13 @@ def test_a_router_is_trusted_where_it_is_the_only_way_to_an_agent_with_keys(keys
         ([], ["tcp/127.0.0.1:1"], None),
     ):
         with pytest.raises(ValueError, match="trusts_router"):
-            agent_configuration("lab", "cell", listen, connect, keys=folder, trusts_router=True)
-    assert "access_control" in agent_configuration("lab", "cell", router, router, keys=cell)
+            agent_configuration("lab", "cell", ["left"], listen, connect, keys=folder, trusts_router=True)
+    assert "access_control" in agent_configuration("lab", "cell", ["left"], router, router, keys=cell)
 
 
 async def test_behind_a_router_an_agent_speaks_for_its_own_host_alone(keys: Path) -> None:
     """One answered the halts, leases and commands of another host, and published its statuses."""
-    async with line(patience=3 * PATIENCE) as here:
+    async with line(seconds=3 * PATIENCE) as here:
         hosts = ["cell", "other"]
         await here.open(router_configuration("lab", hosts, [here.endpoint], keys / "agent-gate"))
         agent = await trusting(here, keys, "other", *hosts)
@@ -368,7 +377,7 @@ async def test_behind_a_router_an_agent_speaks_for_its_own_host_alone(keys: Path
         heard, own = bob.subscribe(ONE), bob.subscribe(f"{OTHER}/*")
         seen = bob.watch(LEFT.key("alive", "*"))
         await bob.watch(f"{OTHER}/alive/*").wait()
-        assert await bob.bus.ask(f"{OTHER}/halt", b"?", timeout=PATIENCE, urgency=Urgency.COMMAND)
+        assert await bob.bus.ask(f"{OTHER}/halt", b"?", timeout=patience(PATIENCE), urgency=Urgency.COMMAND)
         assert not any([await bob.may(verb) for verb in ("info", "halt", "lease", "cmd/hold")])
         for base in (LEFT.base, OTHER):
             agent.publisher(f"{base}/feed", Urgency.COMMAND)(b"news")
@@ -379,13 +388,13 @@ async def test_behind_a_router_an_agent_speaks_for_its_own_host_alone(keys: Path
 
 async def test_behind_a_router_an_agent_sees_another_one_of_its_host_and_of_no_other(keys: Path) -> None:
     """The second one began to serve, beside the first."""
-    async with line(patience=3 * PATIENCE) as here:
+    async with line(seconds=3 * PATIENCE) as here:
         hosts = ["cell", "other"]
         await here.open(router_configuration("lab", hosts, [here.endpoint], keys / "agent-gate"))
         await trusting(here, keys, "cell", "cell")
         second, stranger = await trusting(here, keys, "cell"), await trusting(here, keys, "other")
         token = LEFT.key("alive", "77")
-        while await second.announced("robotiq/v1/lab/cell/*/alive/*", timeout=0.5) != [token]:
+        while await second.announced("robotiq/v1/lab/cell/*/alive/*", timeout=patience(1)) != [token]:
             pass
         assert await stranger.announced("robotiq/v1/lab/cell/*/alive/*", timeout=0.5) == []
         with pytest.raises(AgentError, match="another agent serves zenoh://lab/cell/left already"):
@@ -397,23 +406,65 @@ async def test_behind_a_router_an_agent_sees_another_one_of_its_host_and_of_no_o
 
 async def test_idle_connections_keep_no_client_out() -> None:
     """300 of them, by a client that only opens them, kept new clients out for 12 s."""
-    async with line(protocol="tcp", patience=8) as here:
+    async with line(protocol="tcp", seconds=8) as here:
         agent = await here.agent_bus()
         agent.serve(LEFT.key("info", "*"), lambda query: query.reply(b"!"))
         host, _, port = here.endpoint.removeprefix("tcp/").partition(":")
         for _ in range(300):
             here.stack.enter_context(socket.create_connection((host, int(port))))
         client = await here.client(None)
-        while await client.bus.ask(LEFT.question("x"), b"?", timeout=1.0, urgency=Urgency.COMMAND) is None:
+        while (
+            await client.bus.ask(LEFT.question("x"), b"?", timeout=patience(1), urgency=Urgency.COMMAND)
+            is None
+        ):
             pass
 
 
+async def test_a_flood_of_questions_is_dropped_at_its_connection() -> None:
+    """Each took the interpreter from the agent's loop. Those of others, and about others, are answered."""
+    names = [GripperName("lab", "cell", f"g{number}") for number in range(16)]
+    read: list[str] = []
+
+    def sort(key: str, _: object) -> MessageKind | None:
+        read.append(key)
+        return None if key.endswith("/flood") else MessageKind.QUESTION
+
+    async with line(protocol="tcp", seconds=20) as here:
+        grippers = [each.gripper for each in names]
+        agent = await here.open(agent_configuration("lab", "cell", grippers, [here.endpoint]))
+        for name in names:
+            agent.serve(name.key("info", "*"), lambda query: query.reply(b"!"), sort)
+        flooder, other = [await here.client(None) for _ in range(2)]
+
+        def ask(client: Client, name: GripperName, who: str, limit: float = 1.0) -> asyncio.Future[Any]:
+            question = name.question(who)
+            return client.bus.ask(question, b"?", timeout=patience(limit), urgency=Urgency.QUESTION)
+
+        async def wait_for_answer(client: Client) -> None:
+            while await ask(client, names[1], "x") is None:
+                pass
+
+        for client in (flooder, other):
+            await wait_for_answer(client)
+        sent, took = 500, 1.0
+        while took > sent / QUESTIONS_HZ / 2:  # the machine is too busy for a flood
+            read.clear()
+            begun = now()
+            for _ in range(sent):
+                ask(flooder, names[0], "flood")
+            answers = await asyncio.gather(*(ask(other, name, "x", PATIENCE) for name in names))
+            assert None not in answers
+            await wait_for_answer(flooder)  # behind the flood
+            took = now() - begun
+        assert 0 < read.count(names[0].question("flood")) <= took * QUESTIONS_HZ + 1
+
+
 async def test_many_are_found_at_once() -> None:
-    async with line(protocol="tcp", patience=20) as here:
+    async with line(protocol="tcp", seconds=20) as here:
         agent, client = await here.agent_bus(), (await here.client(None)).bus
         keys = {f"robotiq/v1/lab/cell/g{number}/alive/1" for number in range(MANY)}
         tokens = [agent.announce(key) for key in keys]
-        while set(await client.announced("robotiq/v1/lab/*/*/alive/*", timeout=0.5)) != keys:
+        while set(await client.announced("robotiq/v1/lab/*/*/alive/*", timeout=patience(1))) != keys:
             pass
         assert await client.announced("robotiq/v1/nowhere/**", timeout=0.5) == []
         for take_back in tokens:
@@ -424,9 +475,9 @@ async def test_many_are_found_at_once() -> None:
 async def test_endpoints_that_are_not_reached() -> None:
     """One that is written as a name is another word for what zenoh is connected to."""
     async with (
-        line(protocol="tcp", patience=20) as one,
-        line(protocol="tcp", patience=20) as two,
-        line(protocol="tcp", patience=20) as none,
+        line(protocol="tcp", seconds=20) as one,
+        line(protocol="tcp", seconds=20) as two,
+        line(protocol="tcp", seconds=20) as none,
     ):
         await one.agent_bus()
         agent = await two.agent_bus()
@@ -446,15 +497,15 @@ async def test_a_report_of_endpoints_waits_for_all_names_at_once(monkeypatch: py
 
     def resolve(host: str, *_: object, **__: object) -> list[object]:
         assert host in names
-        asked.wait(PATIENCE)
+        asked.wait(2 * patience(PATIENCE))
         raise socket.gaierror("no name server")
 
-    monkeypatch.setattr(zenoh_bus, "RESOLVED_S", PATIENCE)
+    monkeypatch.setattr(zenoh_bus, "RESOLVED_S", 2 * patience(PATIENCE))
     monkeypatch.setattr(socket, "getaddrinfo", resolve)
     endpoints = [f"tcp/{name}:7447" for name in names]
     bus = await open_bus(client_configuration(endpoints, insecure=True), "the fleet")
     try:
-        async with asyncio.timeout(PATIENCE / 2):
+        async with asyncio.timeout(patience(PATIENCE)):
             assert await bus.unreached() == endpoints
     finally:
         await bus.close()
@@ -465,7 +516,7 @@ async def test_a_report_of_endpoints_waits_for_all_names_at_once(monkeypatch: py
 
 async def moved() -> None:
     server = SimulatorServer(active_gripper(speedup=20.0, spread=False))
-    async with line(protocol="tcp", patience=3 * PATIENCE) as here, server:
+    async with line(protocol="tcp", seconds=3 * PATIENCE) as here, server:
         await here.serve(RobotiqHand(server.address))
         client = await here.client(None)
         async with RemoteHand(str(LEFT), bus=client.bus) as hand:

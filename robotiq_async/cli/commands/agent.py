@@ -85,6 +85,7 @@ async def _serve(settings: AgentSettings) -> None:
     configuration = agent_configuration(
         site,
         host,
+        settings.grippers,
         settings.listen,
         settings.connect,
         keys=settings.keys,

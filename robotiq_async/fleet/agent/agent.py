@@ -110,17 +110,14 @@ class Agent:
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
             questions = AgentQuestions(loop.time)
             sorts: dict[str, Sort] = {
-                "halt": lambda *_: MessageKind.HALT,
-                "lease": self._sort,
-                "cmd/*": self._sort,
-                "info/*": questions.sort,
-                # Clients of version 1 ask there: the answer says that this is another version.
-                "info": questions.sort,
+                f"{self._prefix}/*/halt": lambda *_: MessageKind.HALT,
+                f"{self._prefix}/*/lease": self._sort,
+                f"{self._prefix}/*/cmd/*": self._sort,
             }
-            undo += [
-                self._bus.serve(f"{self._prefix}/*/{verb}", self._receive, sort)
-                for verb, sort in sorts.items()
-            ]
+            # Questions about other grippers have no limit (network/configuration.py): zenoh drops them all.
+            # At "info" clients of version 1 ask: the answer says that this is another version.
+            sorts |= {each.name.key(verb): questions.sort for each in hands for verb in ("info/*", "info")}
+            undo += [self._bus.serve(key, self._receive, sort) for key, sort in sorts.items()]
             ready()
             async with asyncio.TaskGroup() as group:
                 for each in hands:

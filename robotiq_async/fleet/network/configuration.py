@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from ..keys.access import AccessList, access_control
 from ..keys.key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY, check_key_folder
+from ..wire.names import GripperName
 from .endpoints import check_endpoints
 
 PORT: Final = 7447
@@ -19,11 +20,15 @@ UNKNOWN: Final = 1000
 UNKNOWN_MS: Final = 5000  # time in ms after which such connections are closed; zenoh's default is 10 s
 LINK_LEASE_MS: Final = 1000
 """Time in ms after which a frozen or unplugged peer is detected; zenoh's default is 10 s."""
+QUESTIONS_HZ: Final = 500.0
+"""Questions a second about one gripper that zenoh lets in from one connection: nobody asks again within
+2 ms who waits for the answers."""
 
 
 def agent_configuration(
     site: str,
     host: str,
+    grippers: Iterable[str],
     listen: Sequence[str] = (LOOPBACK_ENDPOINT,),
     connect: Sequence[str] = (),
     *,
@@ -31,7 +36,9 @@ def agent_configuration(
     insecure: bool = False,
     trusts_router: bool = False,
 ) -> dict[str, object]:
-    """Configuration of an agent's session. With keys, its access list decides what clients may do.
+    """Configuration of the session of an agent that serves ``grippers``, by their names.
+
+    With keys, its access list decides what clients may do.
 
     Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone. It sees
     the certificate of the router, not the clients' certificates: its own list then refuses them all, unless
@@ -47,9 +54,21 @@ def agent_configuration(
     # A router forwards nothing between peers. Our clients are peers, so the agent is a client of the router.
     mode = "client" if connect and not listen else "peer"
     session = session_configuration(listen, connect, keys) | {"mode": mode}
+    if listen:
+        session |= {"downsampling": _limited_questions(site, host, grippers)}
     if keys is None or trusts_router:
         return session
     return session | {"access_control": access_control(site, (host,), AccessList.read_file(keys / ACCESS))}
+
+
+def _limited_questions(site: str, host: str, grippers: Iterable[str]) -> list[object]:
+    # A flood that zenoh drops at its connection takes no lock of the interpreter, and nothing of what others
+    # may ask. Clients of a router share one connection, so there it would.
+    rules = [
+        {"key_expr": GripperName(site, host, each).key("info", "**"), "freq": QUESTIONS_HZ}
+        for each in grippers
+    ]
+    return [{"messages": ["query"], "flows": ["ingress"], "rules": rules}] if rules else []
 
 
 def check_trust(
