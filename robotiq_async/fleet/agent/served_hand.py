@@ -36,7 +36,7 @@ from ..errors import AgentError, ControlLostError
 from ..network.bus import Bus, Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.settings import COMMANDS, NEEDED, check_changes, moved_by, read_settings, settings_of
+from ..wire.settings import COMMANDS, NEEDED_ARGUMENTS, check_changes, moved_by, read_settings, settings_of
 from ..wire.values import Fields
 from .fingers import Fingers
 from .inhibits import Inhibits
@@ -362,7 +362,7 @@ class ServedHand:
         # Checked here: a coroutine raises for wrong arguments only when it is awaited.
         if wrong := arguments.keys() - COMMANDS[name]:
             raise TypeError(f"requests are in counts, got {', '.join(sorted(wrong))}")
-        if (needed := NEEDED.get(name)) and needed not in arguments:
+        if (needed := NEEDED_ARGUMENTS.get(name)) and needed not in arguments:
             raise TypeError(f"{name} needs {needed}")
         if name != "command":
             return self._carry_out(job)

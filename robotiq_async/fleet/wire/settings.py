@@ -25,7 +25,7 @@ COMMANDS: Final[Mapping[str, frozenset[str]]] = {
 }
 """The methods of a hand that the holder of a lease may call, and ``command`` for several axes at once, with
 their arguments. Clients convert other amounts to counts: the agent restores the counts that it saw."""
-NEEDED: Final[Mapping[str, str]] = {
+NEEDED_ARGUMENTS: Final[Mapping[str, str]] = {
     "set_position": "value",
     "set_speed": "value",
     "set_force": "value",
