@@ -416,7 +416,9 @@ class Controller:
     @property
     def in_flight(self) -> Entry | None:
         """The entry that is on the line: decided on, and neither acknowledged nor lost."""
-        return self.ledger.in_flight
+        # One is written at a time, and no status is taken in meanwhile: only the last can be on the line.
+        last = self.ledger.last
+        return last if last.is_on_the_line else None
 
     def next_write(self, now: float) -> NextWrite | None:
         """The next write; None if nothing is due. It changes nothing, and makes no image."""
@@ -439,7 +441,7 @@ class Controller:
         return self._next_changes(status, now) if duty is None else self._next_of(duty, status, now)
 
     def _next_of(self, duty: Stop | Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        if duty.activates and not duty.writes and self.evidence.may_pass:
+        if duty.activates and not duty.writes and self.evidence.passing.is_open:
             return None  # if the fault lasts, no activation is begun
         image = duty.next_image(self.ledger, status)
         if isinstance(image, Ended):
@@ -457,7 +459,7 @@ class Controller:
         ledger, pending = self.ledger, self._requests.pending
         if self.evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
-        if self.evidence.may_pass and pending.has_changes:
+        if self.evidence.passing.is_open and pending.has_changes:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
         gripping = ledger.gripping(status) if pending.positions and not base.go else NO_AXES

@@ -39,7 +39,6 @@ STRANDED_READS: Final = 10
 FOLLOWS: Final = frozenset({Trigger.SEEN_READY, Trigger.SEEN_FAULT})
 """The conditions in which the gripper follows requests, ours or another client's."""
 
-_NOT_ACTIVE: Final = frozenset({Initialization.RESET, Initialization.ACTIVATING})
 _CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
 
 
@@ -59,8 +58,8 @@ def is_activating(status: RobotiqStatus) -> bool:
 def is_interrupted(status: RobotiqStatus) -> bool:
     """Whether a fault shows in an activation: the fingers may go on as it clears [conceivable]."""
     # gIMC = 2 is a change of mode, which only an active gripper makes.
-    is_begun = status.activation_echo and status.initialization in _NOT_ACTIVE
-    return is_begun and classify(status) is Trigger.SEEN_FAULT
+    is_begun = status.initialization in (Initialization.RESET, Initialization.ACTIVATING)
+    return status.activation_echo and is_begun and classify(status) is Trigger.SEEN_FAULT
 
 
 @cache
@@ -104,8 +103,9 @@ class Evidence:
         self.condition: Trigger | None = None  # what it shows; None while the link is down
         self.passed: int = 0  # how often 0x09 has gone without having lasted
         self._log: Final = log
-        # The reads that have shown it: all, and those since the last silence.
-        self._row: Final = Spell(LASTS_READS, LASTS_S)
+        # The reads that have shown it: all, and those since the last silence. While "all" is open, the next
+        # reads decide about it: not for long, even on a link so slow that each read ends a silence.
+        self.passing: Final = Spell(LASTS_READS, LASTS_S)
         self._since_silence: Final = Spell(LASTS_READS, LASTS_S)
         # Those that have shown a stranded gripper, and its positions.
         self._stuck: Final = Spell(STRANDED_READS, STRANDED_S)
@@ -114,21 +114,16 @@ class Evidence:
     @property
     def is_undecided(self) -> bool:
         """Whether the first statuses on a new link show 0x09, or what may be a stranded gripper."""
-        return self.condition is None and (self.may_pass or self._stuck.is_open)
-
-    @property
-    def may_pass(self) -> bool:
-        """Whether the next reads decide about 0x09. Never on a link so slow that each read ends a silence."""
-        return self._row.is_open
+        return self.condition is None and (self.passing.is_open or self._stuck.is_open)
 
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
         """Take in a status; return its condition, or None while the first one on a new link is undecided."""
         condition = classify(status)
         # Nearly every poll ends here: the gripper was ready, is so, and has not shown 0x09.
-        if condition is self.condition is Trigger.SEEN_READY and not self._row:
+        if condition is self.condition is Trigger.SEEN_READY and not self.passing:
             self.status = status
             return condition
-        if self._row or condition is Trigger.SEEN_FAULT:  # if not, 0x09 need not be looked for
+        if self.passing or condition is Trigger.SEEN_FAULT:  # if not, 0x09 need not be looked for
             judged = self.judged(status, asked)
             # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
             status = status if self.condition is Trigger.SEEN_FAULT else judged
@@ -153,7 +148,7 @@ class Evidence:
     def judged(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
         """Return a status without 0x09 until that has lasted; it was asked for at ``asked``."""
         shows = reg.gFLT.read(status.registers) == _CODE
-        if not shows or (self._row and asked - self._row[-1] > SILENCE_S):
+        if not shows or (self.passing and asked - self.passing[-1] > SILENCE_S):
             if self._since_silence.is_open:
                 self.passed += 1
                 if self.passed == 1 and self._log is not None:
@@ -163,9 +158,9 @@ class Evidence:
                     )
             self._since_silence.clear()
         if not shows:
-            self._row.clear()
+            self.passing.clear()
             return status
-        self._row.add(asked)
+        self.passing.add(asked)
         self._since_silence.add(asked)
         return without_fault(status) if self._since_silence.is_open else status
 

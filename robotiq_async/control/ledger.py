@@ -101,13 +101,6 @@ class Ledger:
         return certain[-1] if certain else self._past[-1]
 
     @property
-    def in_flight(self) -> Entry | None:
-        """The entry that is on the line: neither acknowledged nor lost."""
-        # One is written at a time, and no status is taken in meanwhile: only the last can be on the line.
-        last = self.last
-        return last if last.is_on_the_line else None
-
-    @property
     def base(self) -> Request:
         last = self.last
         return last.image if self._adoption is None else self._adoption.request(last.image.axes)
@@ -130,8 +123,9 @@ class Ledger:
             age = self._age(each)
             # While the echo stays the same, no status shows which of them acts. Equal images act at once; a
             # speed or a force may take SILENT_S.
-            is_equal = is_equal and each.image == shown.image
-            is_alike = is_alike and each.echo == shown.echo and (is_equal or age >= SILENT_S)
+            is_alike = is_alike and each.echo == shown.echo
+            is_equal = is_equal and is_alike and each.image == shown.image
+            is_alike = is_alike and (is_equal or age >= SILENT_S)
             if each.is_on_the_line or not (is_alike or age >= WINDOW_S):
                 return ahead[number:]
         return ()
@@ -219,10 +213,8 @@ class Ledger:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
         entry = Entry(image, image.echo, is_ours=True, sent=now, is_early=is_early)
-        if self.limits.limited:
-            self.limits.forget(axes)
-        if self.contacts.shown:
-            self.contacts.ask(axes)
+        self.limits.forget(axes)
+        self.contacts.ask(axes)
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         self.requests.ask(entry, before, is_at_rest=before.image.go)
         self.ours |= axes
@@ -268,8 +260,8 @@ class Ledger:
         if newest is not shown and newest.is_ours and newest.echo != shown.echo:
             self._delay = max(0.0, before.time - newest.sent)
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
-        if self._adoption is not None and self.match is self.last:
-            self._adoption = self._adoption._replace(latest=status, now=self.now)
+        if self._adoption is not None and self.match is newest:
+            self._adoption = Adoption(self._adoption.since, self._adoption.first, status, self.now)
         if self.begun is not None and self._has_ended(self.begun.entry, status):
             self.begun = None
         if is_ready and self.match is not None:

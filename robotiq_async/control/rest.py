@@ -163,19 +163,13 @@ def _is_true_since(
 
 
 class RecentRequests:
-    """The requests that the object status of each axis may be from, until it is proven to rest.
-
-    Attributes:
-        targets: by axis, the oldest first. All unrested axes have some. Usually none has, which spares a poll
-            all questions about them.
-        unrested: the axes that are not known to rest under their last request.
-        course: of those that have recent requests.
-    """
+    """The requests that the object status of each axis may be from, until it is proven to rest."""
 
     def __init__(self, model: Model) -> None:
-        self.unrested: Finger = NO_AXES
-        self.course: Final = Course()
+        self.unrested: Finger = NO_AXES  # the axes that are not known to rest under their last request
+        self.course: Final = Course()  # of the axes with recent requests
         self._model: Final = model
+        # By axis, the oldest first. Usually there is none, which spares a poll all questions about them.
         self.targets: Final[dict[Finger, list[Target]]] = {}
 
     def ask(

@@ -228,7 +228,7 @@ def test_it_takes_some_reads_and_some_time_without_a_silence(at: list[float], sh
 
 def test_without_it_the_first_status_decides() -> None:
     evidence = Evidence()
-    assert not evidence.may_pass
+    assert not evidence.passing.is_open
     assert evidence.update(status_of(0x31, 0xFF, at=0.0), 0.0) is Trigger.SEEN_READY
     assert not evidence.is_undecided
 
