@@ -146,6 +146,25 @@ async def test_a_copy_of_the_request_for_the_lease_forgets_no_setting_on_its_way
     assert Request.from_registers(here.gripper.request_registers).axes[0].force == 200
 
 
+@pytest.mark.parametrize("timeout", ["soon", True, 0, -1.0, float("inf"), float("nan")])
+@inside(lab)
+async def test_a_command_that_is_refused_changes_no_grip(
+    here: Lab, hand: RemoteHand, timeout: object
+) -> None:
+    """Its axis had got the new holder's force by then, and the next image wrote it."""
+    await hand.set_force(200)
+    await hand.release(keep_grip=True)
+    async with here.client("other") as other:
+        assert other._session is not None
+        arguments = {"position": 90, "fingers": 1, "timeout": timeout}
+        with pytest.raises((TypeError, ValueError), match="timeout"):
+            await other._session.dialog.ask("cmd/move", arguments, timeout=1.0)
+        await other.set_speed(3, Finger.B)
+        await asyncio.sleep(0.5)
+        axes = Request.from_registers(here.gripper.request_registers).axes
+        assert [axis.force for axis in axes] == [200] * 4
+
+
 @inside(lab)
 async def test_a_new_holder_changes_no_grip(here: Lab, hand: RemoteHand) -> None:
     """Its first motion of an axis sets that axis alone, and uses FLEET.toml for what it did not ask for."""

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
 from dataclasses import replace
 from typing import Final
 
@@ -359,11 +360,15 @@ class ServedHand:
 
     def _work(self, job: Job) -> Work:
         name, arguments = job.name, job.call.arguments
-        # Checked here: a coroutine raises for wrong arguments only when it is awaited.
+        # Checked here: a coroutine raises for wrong arguments only when it is awaited. By then the axes that
+        # it would move may have been given the speed and force of their new holder.
         if wrong := arguments.keys() - COMMANDS[name]:
             raise TypeError(f"requests are in counts, got {', '.join(sorted(wrong))}")
         if (needed := NEEDED_ARGUMENTS.get(name)) and needed not in arguments:
             raise TypeError(f"{name} needs {needed}")
+        timeout = arguments.get("timeout")
+        if timeout is not None and not (type(timeout) in (int, float) and 0 < timeout <= sys.float_info.max):
+            raise TypeError(f"timeout must be null or seconds above 0, got {timeout!r:.100}")
         if name != "command":
             return self._carry_out(job)
         if not isinstance(arguments["axes"], dict):
