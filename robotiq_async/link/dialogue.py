@@ -21,11 +21,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from itertools import chain, cycle
+from itertools import cycle
 from typing import Final
 
 from ..runtime.logger import Log
-from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
 from .exchange import HUSH, READY, TURN, Dialogue, Exchange, Timing
@@ -80,9 +79,8 @@ class Dialogues:
         self._poll: Final = read_request(registers, registers.count)
         self._rest: Registers | None = None if registers.count < REGISTER_COUNT else ()
         """The registers after those that a poll reads, as the first probe found them; None before it."""
-        all_of_them = () if self._rest is not None else (REGISTER_COUNT,)
-        self._probes: Final = chain(all_of_them, cycle(range(1, registers.count)))
-        """Numbers of registers: those of the reads that bring the line in step, each another one."""
+        self._probes: Final = cycle(range(1, registers.count))
+        """The numbers of registers of the reads that bring the line in step, each another one."""
         self._outstanding: Final[deque[bytes]] = deque(maxlen=MOST_OUTSTANDING)
         """Requests whose answers may still come, in order."""
         self._unanswered: Final = deque((-math.inf,) * MOST_UNANSWERED, MOST_UNANSWERED)
@@ -207,7 +205,7 @@ class Dialogues:
             # A stop that comes again must be heard. The trial at the next opening would cost another response
             # timeout, in which fingers move on. On a line that others use it takes a short question, and they
             # would pay for a gripper that is dead.
-            self._keep_long_silence(came_to.error)
+            self._keep_long_silence(came_to)
         return came_to
 
     def _again(self, first: Outcome, *, was_write: bool = False) -> Dialogue[bytes]:
@@ -230,7 +228,7 @@ class Dialogues:
             if isinstance(came_to, bytes):
                 came_to = yield self._ask(self._poll, timing)
             if isinstance(came_to, bytes):
-                self._note_repeat(first.error)
+                self._note_repeat(first)
                 return came_to
             is_asked_again = isinstance(came_to, Silent | Noise) and self.line.is_shared
             if not is_asked_again or self.line.now() > until:
@@ -253,7 +251,7 @@ class Dialogues:
         The first one of all asks a jaw for eight registers, which show a wrong model.
         """
         while True:
-            request = read_request(self._map, next(self._probes))
+            request = read_request(self._map, REGISTER_COUNT if self._rest is None else next(self._probes))
             came_to = yield self._ask(request, timing)
             if self._rest is None:
                 self._rest = registers_in(came_to)[self._map.count :] if isinstance(came_to, bytes) else ()
@@ -276,7 +274,7 @@ class Dialogues:
                 if not self._can_repeat(came_to):
                     raise came_to.error
                 if not isinstance(came_to, Refused):
-                    self._keep_long_silence(came_to.error)
+                    self._keep_long_silence(came_to)
                 yield TURN
                 check((yield from self._in_step()))
                 break
@@ -304,21 +302,21 @@ class Dialogues:
         self._status = registers[: self._map.count] + self._rest if self._rest else registers
         return self._status
 
-    def _note_repeat(self, why: RobotiqConnectionError) -> None:
+    def _note_repeat(self, first: Outcome) -> None:
         self.repeats += 1
         now = self.line.now()
-        if isinstance(why, ResponseTimeoutError):
+        if isinstance(first, Silent):
             self._unanswered.append(now)
             if now - self._unanswered[0] < UNANSWERED_S:
-                self._keep_long_silence(why)
+                self._keep_long_silence(first)
         if now - self._warned >= REPEAT_WARNING_S:
             self._warned = now
-            self._log.warning("a read was repeated: %s (%d times so far)", why, self.repeats)
+            self._log.warning("a read was repeated: %s (%d times so far)", first.error, self.repeats)
 
-    def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
+    def _keep_long_silence(self, why: Outcome) -> None:
         """Take the longer silence from here on, because a request after the shorter one had no answer."""
         silence = self.line.silence
         if silence.is_short:
             silence.lengthen()
             what = "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s"
-            self._log.warning(what, self.line.address, 1000 * silence.short_s, why)
+            self._log.warning(what, self.line.address, 1000 * silence.short_s, why.error)

@@ -51,11 +51,11 @@ class Exchange(ABC):
     """
 
     extra: Stray | None = None
+    _received = b""
 
     def __init__(self, frame: bytes, timing: Timing) -> None:
         self.frame: Final = frame
         self.timing: Final = timing
-        self._received = b""
 
     def feed(self, data: bytes) -> Answer | None:
         """Take bytes; None while more must come."""
@@ -75,12 +75,13 @@ class TcpExchange(Exchange):
     """A request over Modbus TCP."""
 
     def _verdict(self, received: bytes) -> Answer | None:
-        header, expected = self.frame[:4], frames.expected_over_tcp(self.frame[6:])
+        frame = self.frame
+        expected = frames.expected_over_tcp(frame[6:])
         # The usual case, which is cheap: the header is the only part of a reply that is not as the last time.
-        is_usual = len(received) == 4 + expected.size and received.startswith(expected.start, 4)
-        if is_usual and received.startswith(header):
+        is_usual = received.startswith(frame[:4]) and received.startswith(expected.start, 4)
+        if is_usual and len(received) == 4 + expected.size:
             return received[7:]
-        return expected.after(header).verdict(received)
+        return expected.after(frame[:4]).verdict(received)
 
 
 class PduExchange(Exchange):

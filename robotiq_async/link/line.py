@@ -81,6 +81,7 @@ class Line:
         forgives: whether a lost or damaged byte is no reason to give up the line.
         silence: that between two frames.
         echo: whether the line brings back each request.
+        users: those for whom it is open.
         asked_at: the time of the last request.
     """
 
@@ -109,7 +110,7 @@ class Line:
         self._stray: Final = stray
         self._shares: Final = shares
         self._turns: Final = asyncio.Lock()
-        self._users: Final[set[object]] = set()
+        self.users: Final[set[object]] = set()
         self._holders: Final[WeakKeyDictionary[object, Log]] = WeakKeyDictionary()
         """The logs of those who open it again after a loss, whether they are users now or not."""
         self._patience: Final = LinePatience()
@@ -148,9 +149,6 @@ class Line:
         """Whether several have it, be they users now or about to open it again."""
         return self._shares and len(self._holders) > 1
 
-    def is_open_for(self, user: object) -> bool:
-        return user in self._users
-
     def now(self) -> float:
         return self._watchdog.clock()
 
@@ -169,7 +167,7 @@ class Line:
         async with self._turns:
             if self.state is CLOSED:
                 await self._connect(seconds)
-            self._users.add(user)
+            self.users.add(user)
 
     async def _connect(self, seconds: float) -> None:
         _close_left()
@@ -203,13 +201,13 @@ class Line:
 
     def leave(self, user: object) -> None:
         """End the use of the line, between two exchanges; the last user closes it."""
-        self._users.discard(user)
-        if not self._users and self.state is not OPENING:
+        self.users.discard(user)
+        if not self.users and self.state is not OPENING:
             self._close()
 
     def _break_off(self, user: object) -> None:
         """End the use of a line on which a reply may still come."""
-        if self._in_flight is not None or user in self._users:
+        if self._in_flight is not None or user in self.users:
             self._end(self._lost())
             self._speaker = None
             self.leave(user)
@@ -217,7 +215,7 @@ class Line:
     def _close(self, why: Outcome | None = None) -> None:
         if self.state is not CLOSED:
             self._become(CLOSED, why)
-            self._users.clear()
+            self.users.clear()
             self._watchdog.stop()
             self._end(self._lost())
             self._wire.close()
@@ -249,10 +247,10 @@ class Line:
                         came_to = await self._hush()
                     else:
                         if self.silence.short_s and self.state is not CLOSED:
-                            is_long = isinstance(step, Exchange) and step.timing.is_long
+                            is_long = not isinstance(step, Step) and step.timing.is_long
                             await self.silence.keep(self._watchdog.clock, is_long=is_long)
-                        why = self.why if user in self._users else self._lost()
-                        came_to = why or (await self._begin(step) if isinstance(step, Exchange) else DONE)
+                        why = self.why if user in self.users else self._lost()
+                        came_to = why or (DONE if isinstance(step, Step) else await self._begin(step))
                     step = dialogue.send(came_to)
             except StopIteration as end:
                 result: T = end.value
@@ -278,7 +276,7 @@ class Line:
             raise
         before, self._speaker = self._speaker, user
         is_left_over = self.state is DISTURBED and not isinstance(self.why, Stray)
-        return is_left_over and before is not user and user in self._users
+        return is_left_over and before is not user and user in self.users
 
     def _lost(self) -> Lost:
         """The outcome for one who is no user of the line, or no more."""

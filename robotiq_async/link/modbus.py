@@ -82,7 +82,7 @@ class ModbusTransport:
 
     @property
     def is_open(self) -> bool:
-        return self.dialogues.line.is_open_for(self)
+        return self in self.dialogues.line.users
 
     @property
     def asked_at(self) -> float:

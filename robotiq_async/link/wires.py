@@ -97,8 +97,6 @@ class _ClientWire:
     """A connection of a pymodbus client."""
 
     _client: ModbusClient | None = None
-    _ending: str
-    """How the end of the wire is told, after its address."""
 
     def __init__(self, address: Address) -> None:
         self._address = address
@@ -109,7 +107,8 @@ class _ClientWire:
             client.close()
 
     def _lost(self) -> Lost:
-        return Lost(ConnectionLostError(f"{self._address}{self._ending}"))
+        how = " closed the connection" if self._address.is_socket else f": {GONE}"
+        return Lost(ConnectionLostError(f"{self._address}{how}"))
 
     async def _connect(self, make: Callable[..., ModbusClient], on_data: OnData, on_end: OnEnd) -> Send:
         """Connect a client, whose settings ``make`` has."""
@@ -136,8 +135,6 @@ class _ClientWire:
 
 class SocketWire(_ClientWire):
     """A TCP connection."""
-
-    _ending = " closed the connection"
 
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
         """Connect to the first address of the host that can be reached.
@@ -186,8 +183,6 @@ class SocketWire(_ClientWire):
 
 class SerialWire(_ClientWire):
     """A serial port of this machine."""
-
-    _ending = f": {GONE}"
 
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:  # noqa: ARG002
         """Open the port with the settings of the address."""

@@ -176,7 +176,7 @@ class UrcapTransport:
 
     @property
     def is_open(self) -> bool:
-        return self._line.is_open_for(self)
+        return self in self._line.users
 
     @property
     def asked_at(self) -> float:
