@@ -67,7 +67,7 @@ def _purpose(name: str) -> str:
 
 def inhibit() -> str:
     """The calls that an inhibit refuses."""
-    except_for = {Trigger.ASK_COMMAND: "; one that sets nothing but a speed passes"}
+    except_for = {Trigger.ASK_COMMAND: "; a command that sets only a speed passes"}
     return "\n".join(f"- {each.value}{except_for.get(each, '')}" for each in Trigger if each in MOVES)
 
 
