@@ -27,7 +27,7 @@ class Adoption(NamedTuple):
     since: Moment  # from then on a moving axis has time to show its direction, and a late gDT to come
     first: RobotiqStatus
     latest: RobotiqStatus
-    now: Moment  # when that was asked for
+    now: Moment  # when the latest status was requested
 
     @property
     def is_certain(self) -> bool:
@@ -62,7 +62,7 @@ class Adoption(NamedTuple):
         )
 
     def _position(self, axis: Finger) -> int:
-        """The echo that agrees with what an axis shows, if one does."""
+        """The request to repeat: the echo that agrees, else one that keeps the contact or the position."""
         status, position = self.latest, self.latest.position(axis)
         if not status.go_echo:
             return position  # it stands [manual 2014, p. 50], and the next rGTO = 1 must not move it

@@ -1,11 +1,11 @@
-"""Decides what to write: takes in statuses and requests, and gives the image that is due.
+"""Decides about writes: takes in statuses and requests, and gives the image that is due.
 
 No I/O, no clock and no event loop. The task that owns the link calls see() with each status that it has read;
 next_write() to learn whether there is something to write; decide() for the image, in the turn in which the
 link writes, and acknowledged(); and lost() if the link goes down at any point.
 
-A request ends what others wait for: a halt the moves, a command that of its axes. Their callers are handed
-over and not answered: what they do then may hold up the loop, and the write goes first.
+A request may end the waits of others: a halt ends all moves, a command the moves of its axes. Their callers
+are handed over and not answered: their next steps may hold up the loop, and the write goes first.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Controller:
         """Whether a gripper that is found reset is activated, from here on."""
         self.activates = allowed
 
-    # -- what is asked ---------------------------------------------------------------------------------
+    # -- requests --------------------------------------------------------------------------------------
     # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
 
     def command(self, command: Pending, waiter: Waiter[None] | None = None) -> None:
@@ -101,20 +101,20 @@ class Controller:
         self._requests.add(move)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
-        """The caller of a move has left: if it has given up, hold those of its axes that still move."""
+        """The caller of a move has left: if it has given up, hold the axes of the move that still move."""
         # ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
         requests = self._requests
         is_open, left = requests.leave(move)
         if is_open or unseen:
             requests.hold(left, "a move was given up")
-            # Its other axes follow it until what has taken them over is written, and that may be lost.
+            # Its other axes follow it until the request that took them over is written, which may be lost.
             requests.merge_hold(move.axes & requests.pending.moved)
         if unseen and not is_open and self.evidence.condition is not None:
             # Axes that another client moves by now are left to it. On a new link that is found out first.
             requests.hold_only(self.ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
-        """Hold those axes that move, whichever client moves them. It ends no activation and no release."""
+        """Hold axes that move, also for another client. It ends no activation and no release."""
         is_due = self.machine.ask(Trigger.ASK_HOLD, self.status)
         if self.is_driven:
             self.machine.log.warning("a hold ends no activation and no release: halt() does, by a reset")
@@ -141,7 +141,7 @@ class Controller:
             self._begin(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
-        """Begin a reset, unless one is about to be sent; ASK_HALT or HALT_RESETS if a halt asks for it."""
+        """Begin a reset, unless a reset is about to be sent; ASK_HALT or HALT_RESETS if a halt needs it."""
         if self.machine.ask(trigger, self.status):
             who = "reset" if trigger is Trigger.ASK_RESET else "halt"
             self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
@@ -185,12 +185,12 @@ class Controller:
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self) -> None:
-        """Make a stop that has begun to keep a grip clear rGTO after all."""
+        """Turn a stop that has begun to keep a grip into a stop that clears rGTO."""
         if isinstance(self._duty, Keeping):
             self._duty = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
-        """Begin to stop the fingers, if any may move: by KEEP or SHUTDOWN, in a sequence of ours by RESET."""
+        """Begin to stop the fingers, if any may move: by KEEP or SHUTDOWN, in our sequence by RESET."""
         status = self.evidence.status
         if self.ledger.begun is not None:
             self._duty = Stop(StopLevel.RESET)
@@ -200,7 +200,7 @@ class Controller:
         else:
             self._duty = Stop(StopLevel.SHUTDOWN)
 
-    # -- what follows from that ------------------------------------------------------------------------
+    # -- their consequences ----------------------------------------------------------------------------
 
     def _begin(self, trigger: Trigger) -> None:
         is_stranded = self.evidence.condition is Trigger.SEEN_STRANDED
@@ -210,27 +210,27 @@ class Controller:
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
-        """Reset; ``error`` is what the callers get whose requests end with it."""
+        """Reset; ``error`` is for the callers whose requests it ends."""
         self._ended(self._drop_all(), error)
         self._duty = Stop(StopLevel.RESET)
         self._update_state(trigger)
 
     def _drop_all(self) -> list[Waiter[Any]]:
-        """Drop everything asked so far, a duty too, and return the callers. A write may be on the line."""
+        """Drop all requests and the duty, and return the callers. A write may be on the line."""
         self._duty = None
         return self._requests.drop(holds=True)
 
-    # -- what is known ---------------------------------------------------------------------------------
+    # -- knowledge -------------------------------------------------------------------------------------
 
     @property
     def speeds(self) -> dict[Finger, int]:
-        """The speed of each axis, as far as it is known, once what is pending is written."""
+        """The speed of each axis, as far as it is known, once the pending changes are written."""
         base = {axis: request.speed for axis, request in self.ledger.base.by_axis}
         return {**base, **self._requests.pending.speeds}
 
     @property
     def is_moving(self) -> bool:
-        """Whether an axis moves, or will because of what does not act yet."""
+        """Whether an axis moves, or will because of a write that does not act yet."""
         if self.status is None:
             return False
         if self.status.is_moving or self.is_driven:
@@ -274,7 +274,7 @@ class Controller:
         return self.status is not None or ledger.begun is not None or not ledger.is_settled
 
     def _view(self) -> State:
-        """The state: that of the duty; if it makes none, what the gripper shows."""
+        """The state of the duty; if the duty has none, the state that the gripper shows."""
         duty, condition, state = self._duty, self.evidence.condition, self.machine.state
         if state in _OFF:
             return state
@@ -293,15 +293,15 @@ class Controller:
             state = State.RUNNING_IDLE  # a call begins it, and not a fault that clears while a hold waits
         self.machine.show(state, trigger)
 
-    # -- what a status shows ---------------------------------------------------------------------------
+    # -- statuses --------------------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status that was read after every acknowledgement so far; asked for at that time."""
+        """Take in a status that was read after every acknowledgement so far; requested at ``asked``."""
         ledger, duty, before = self.ledger, self._duty, self.evidence.condition
         self.status = status
         condition = self.evidence.update(status, asked)
         ledger.update(status, asked, is_ready=condition is before is Trigger.SEEN_READY)
-        # This runs at every poll, so it works out only what is waited for.
+        # This runs at every poll, so it works out only results that somebody waits for.
         if duty is not None:
             if isinstance(duty, Stop):
                 self._advance(duty)
@@ -330,20 +330,20 @@ class Controller:
         ledger, requests = self.ledger, self._requests
         # It followed requests before (None: the link was down), it does now, an entry explains its image.
         match before and before in FOLLOWS, condition in FOLLOWS, ledger.match is not None:
-            case None, _, _:  # continue from our image if the gripper shows one
+            case None, _, _:  # continue from our image if the gripper shows it
                 if ledger.match is None or not ledger.match.is_ours:
                     ledger.adopt(status)
                 requests.hold_only(ledger.ours)
             case False, True, _:
-                # Others have reset and activated it, even if its image is equal to one of ours [follows].
+                # Others have reset and activated it, even if its image is equal to ours [follows].
                 ledger.adopt(status, is_found=True)
             case True, True, False:
-                self._adopt_other_client(status)  # before a fault's hold, which would undo what it wrote
+                self._adopt_other_client(status)  # before a fault's hold, which would undo its request
             case _, False, False:
                 ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
 
     def _note_condition(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
-        """A new condition: what ends, what is held; on a new link the activation or reset that is due."""
+        """End and hold as a new condition demands; on a new link begin a due activation or reset."""
         requests, is_found, is_inhibited = self._requests, before is None, self.machine.inhibited is not None
         fault, lost = GripperFaultError(status.fault), NotActivatedError("the gripper lost its activation")
         if before in FOLLOWS and condition not in FOLLOWS:
@@ -411,7 +411,7 @@ class Controller:
         if condition in FOLLOWS and not is_known and not self.is_off:
             self._adopt_other_client(status)
 
-    # -- what is written -------------------------------------------------------------------------------
+    # -- writes ----------------------------------------------------------------------------------------
 
     @property
     def in_flight(self) -> Entry | None:
@@ -467,12 +467,12 @@ class Controller:
         if pending.hold:
             pending = self._requests.begin_hold(now)
             held = ledger.held(pending.hold, status, now - ledger.now.time)
-            # What may press on its part is not held before that is known.
+            # An axis that may press on its part is not held before that is known.
             left = pending.held_later(ledger.may_press(status, pending.hold_began))
         image = merged(base, pending, status, gripping=gripping, held=held)
         if not pending.has_changes and gate(image, status, may_reset=ledger.may_reset) == base:
-            # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
-            # earlier write does not act yet, an axis may begin to move: ask again then.
+            # No axis moves, so there is nothing to write, and the image of the gripper answers the callers.
+            # If an earlier write does not act yet, an axis may begin to move: decide again then.
             if ledger.is_settled:
                 self._requests.sending(ledger.last, left)
                 self._requests.acknowledged()
@@ -484,7 +484,7 @@ class Controller:
         self, image: Request, status: RobotiqStatus, now: float, left: Pending, duty: Duty | None = None
     ) -> Request:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
-        # ``left`` is what it has not of all that is pending.
+        # ``left`` are the pending changes that the image leaves out.
         activates, releases = (False, False) if duty is None else (duty.activates, duty.releases)
         may_reset = self.ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)

@@ -47,20 +47,20 @@ class Entry:
         self.is_doubtful = True
 
     def believe(self, now: float) -> None:
-        """Note that it acts after all, by an echo: that is its acknowledgement if it had none."""
+        """Note that its echo shows, so it acts: the echo is its acknowledgement if none came."""
         self.acknowledged, self.is_doubtful = self.acknowledged or now, False
 
     def correct(self, image: Request, echo: Echo) -> None:
-        """Take in what a status has shown of it: another client's requests, or limits in place of ours."""
+        """Take in its true image from a status: another client's requests, or limits instead of ours."""
         self.image, self.echo = image, echo
 
 
 class Begun(NamedTuple):
-    """An activation or a release that a write of ours has begun, or may have: stopping the hand ends it.
+    """An activation or a release that our write has begun, or may have begun: stopping the hand ends it.
 
-    A write begins an activation that nobody asked for if another client resets the gripper just before it:
+    A write begins an activation that nobody requested if another client resets the gripper just before it:
     then its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
     """
 
     entry: Entry
-    first: RobotiqStatus | None = None  # the first status of one that was not asked for
+    first: RobotiqStatus | None = None  # the first status, if nobody requested it

@@ -23,14 +23,14 @@ from ..values.model import Model
 from ..values.status import RobotiqStatus
 
 LASTS_READS: Final = 3
-"""Reads that must show it. A gripper shows it in one; a second read may see the same registers."""
+"""Reads that must show 0x09. A gripper shows it in one; a second read may see the same registers."""
 LASTS_S: Final = 0.01
 """Seconds between the first and the last of these reads. A gripper renews its registers at 100 Hz or faster
 [manual 2014, p. 75], so three reads over this time show it more than once. It must not be longer:
-fingers that must stop move on in this time, a count or two at full speed."""
+fingers that must stop keep moving in this time, a count or two at full speed."""
 SILENCE_S: Final = 0.9
-"""After this time without a read a gripper may show it again, and the count begins again. One second is what
-is known [seen]. A program that is stepped through in a debugger makes such silences."""
+"""After this time without a read a gripper may show it again, and the count begins again. One second was
+observed [seen]. A program that is stepped through in a debugger makes such silences."""
 STRANDED_S: Final = 0.5
 """Seconds for which a gripper must show gACT = 1 with gIMC = 0 and the same positions to count as stranded.
 No figure is published for how soon an activation shows; 0.2 s is the slowest device cycle considered."""
@@ -45,18 +45,18 @@ _CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
 def classify(status: RobotiqStatus) -> Trigger:
     """The condition that a status shows by itself, one of five."""
     # A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset [manual 2014,
-    # p. 50; 2018, p. 39]. Only gACT, gIMC and gFLT decide: they rarely change, so what they show is cached.
+    # p. 50; 2018, p. 39]. Only gACT, gIMC and gFLT decide: they rarely change, so the result is cached.
     registers = status.registers
     return _classify(registers[0] >> 8, registers[1] >> 8 & 0x0F, status.model)
 
 
 def is_activating(status: RobotiqStatus) -> bool:
-    """Whether the gripper activates. A change of mode is busy as well, and keeps what the hand holds."""
+    """Whether the gripper activates. A change of mode is busy as well, and keeps a held part."""
     return classify(status) is Trigger.SEEN_BUSY and status.initialization is Initialization.ACTIVATING
 
 
 def is_interrupted(status: RobotiqStatus) -> bool:
-    """Whether a fault shows in an activation: the fingers may go on as it clears [conceivable]."""
+    """Whether a fault shows in an activation: the fingers may continue when it clears [conceivable]."""
     # gIMC = 2 is a change of mode, which only an active gripper makes.
     is_begun = status.initialization in (Initialization.RESET, Initialization.ACTIVATING)
     return status.activation_echo and is_begun and classify(status) is Trigger.SEEN_FAULT
@@ -78,7 +78,7 @@ def _classify(activation: int, fault: int, model: Model) -> Trigger:
 
 
 class Spell(list[float]):
-    """When the reads in a row that show the same were asked for: it counts once it lasts."""
+    """The times at which equal reads in a row were requested. What they show counts once it lasts."""
 
     def __init__(self, least: int, seconds: float) -> None:
         super().__init__()
@@ -100,7 +100,7 @@ class Evidence:
 
     def __init__(self, log: Log | None = None) -> None:
         self.status: RobotiqStatus | None = None
-        self.condition: Trigger | None = None  # what it shows; None while the link is down
+        self.condition: Trigger | None = None  # of the newest status; None while the link is down
         self.passed: int = 0  # how often 0x09 has gone without having lasted
         self._log: Final = log
         # The reads that have shown it: all, and those since the last silence. While "all" is open, the next
@@ -113,7 +113,7 @@ class Evidence:
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the first statuses on a new link show 0x09, or what may be a stranded gripper."""
+        """Whether the first statuses on a new link show 0x09, or a gripper that may be stranded."""
         return self.condition is None and (self.passing.is_open or self._stuck.is_open)
 
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
@@ -146,7 +146,7 @@ class Evidence:
         self._stuck.clear()
 
     def judged(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
-        """Return a status without 0x09 until that has lasted; it was asked for at ``asked``."""
+        """Return a status without 0x09 until 0x09 has lasted; the status was requested at ``asked``."""
         shows = reg.gFLT.read(status.registers) == _CODE
         if not shows or (self.passing and asked - self.passing[-1] > SILENCE_S):
             if self._since_silence.is_open:

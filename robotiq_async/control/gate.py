@@ -3,8 +3,8 @@
 A rising rACT moves all fingers to their stops, and rATR releases the part [manual 2012, 4.6]. An image is
 made from an older one, so either could be carried along by accident: by a command after another client's
 reset, by a stop that crosses a power cycle, by a hold after a release. So an image has rACT only if the
-gripper shows it and nothing of ours may clear it first, and rATR never; an activation may raise rACT, and a
-release rATR.
+gripper shows it and none of our images may clear it first, and rATR never; an activation may raise rACT, and
+a release rATR.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def merged(
 
 
 def at_rest(base: Request, status: RobotiqStatus) -> Request:
-    """Clear rGTO and ask every axis to be where it is, so that no axis starts."""
-    # The positions count at the next rGTO = 1, of whichever client.
+    """Clear rGTO and request the present position of every axis, so that no axis starts."""
+    # The positions count when any client sets rGTO next.
     here = {axis: status.position(axis) for axis in status.model.axes}
     return replace(base, go=False).with_positions(here)
 
@@ -67,8 +67,8 @@ def gate(
     activates: bool = False,
     releases: bool = False,
 ) -> Request:
-    """The image as it may be written: ``activates`` or ``releases`` if it begins what was asked for."""
-    # ``may_reset`` if an earlier image of ours may reset the gripper before this one acts.
+    """The image as it may be written: ``activates`` or ``releases`` if it begins a requested procedure."""
+    # ``may_reset`` if our earlier image may reset the gripper before this one acts.
     # The race that is left: after a stop has_activated() in stops.py finds it, after a command or a hold
     # sees_stray() in ledger.py.
     activate = image.activate and (activates or (status.activation_echo and not may_reset))

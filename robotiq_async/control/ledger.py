@@ -1,6 +1,6 @@
 """The ledger: the images that the gripper has, had, or may get.
 
-No I/O and no clock: callers give the time of a write, and questions are about that of the newest status.
+No I/O and no clock: callers give the time of a write, and answers hold for the time of the newest status.
 """
 
 # The gripper's requests cannot be read back whole: speed and force have no echo [manual 2014, pp. 50-56], a
@@ -8,27 +8,28 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 # order in which they act:
 #
 # * sent: on the line. It may act already, or never.
-# * acknowledged: it acts within a device cycle. The newest such entry is what the gripper has, or is about to
-#   have: the base of the next image.
+# * acknowledged: it acts within a device cycle. The gripper has the newest such entry, or is about to have
+#   it: the base of the next image.
 # * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows];
 #   one from before another client's image counts as that client's.
 # * doubtful: the link went down before it showed (a URCap acknowledges before its gripper), or another
 #   client's image showed first [follows]. It may act, and is not the base. If it shows, it is certain again,
-#   and so is what was acknowledged after it.
+#   and so are entries that were acknowledged after it.
 #
 # The newest that showed divides the entries, and no entry has a number:
 #
 #             past                      ahead
 #   [oldest .......... shown]  [next .......... newest]
-#    may show once more         may show, and then joins the past; what is before it goes with it, or is
-#                               dropped if it is in doubt
+#    may show again             may show, and then joins the past; entries before it go with it, or are
+#                               dropped if they are in doubt
 #
-# Whatever is asked about the future is asked of what is ahead and does not act by its time: may the gripper
-# be reset, may an axis start.
+# Questions about the next moments (may the gripper be reset, may an axis start) are about the entries ahead
+# that do not act yet by their time.
 #
-# A status that shows no entry of the last half second shows another client's image, or a power cycle: that
-# becomes the whole past, and what is ahead is in doubt. An entry that was replaced longer ago cannot show in
-# an echo, and is forgotten. gDT may trail the echo [vendor]: rest.py has the requests that it may be from.
+# A status that shows no entry of the last half second shows another client's image, or a power cycle: its
+# image becomes the whole past, and entries ahead are in doubt. An entry that was replaced longer ago cannot
+# show in an echo, and is forgotten. gDT may trail the echo [vendor]: rest.py has the requests that it may be
+# from.
 
 from __future__ import annotations
 
@@ -49,13 +50,13 @@ from .rest import Contacts, Moment, RecentRequests, drifts
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
-0.2 s [conceivable], and the poll that could show it may come late. It bounds what an echo can show."""
+0.2 s [conceivable], and the poll that could show it may come late. No older entry shows in an echo."""
 SILENT_S: Final = 0.25
-"""Time in which a write acts where no echo shows it (speed, force; one that was lost with the link): the
+"""Time in which a write acts where no echo shows it (speed, force; a write lost with the link): the
 slowest device cycle and 0.05 s."""
 STRAY_COUNTS: Final = 10
-"""An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
-for less: 10 counts take 0.09 s [thesis]."""
+"""An axis that moves further in an activation is driven by it. An axis that a stop catches at full speed
+moves less: 10 counts take 0.09 s [thesis]."""
 NEVER: Final = float("-inf")
 
 
@@ -63,20 +64,20 @@ class Ledger:
     """The entries, the oldest first.
 
     The ``first`` image was never written: it has the speed and the force of each axis until others are set.
-    ``before`` is the ledger of the session before: what it has written may still act.
+    ``before`` is the ledger of the session before: its writes may still act.
     """
 
     def __init__(self, first: Request, log: Log = log, before: Ledger | None = None) -> None:
-        # The certain ones that a status may show, up to the newest that showed; and those that act after it.
-        # These are replaced and never changed, as another thread may ask whether something moves.
+        # The certain entries that a status may show, up to the newest that showed; and the entries after it.
+        # The tuple is replaced and never changed, as another thread may read whether something moves.
         self._past = deque([Entry(first, first.echo, False, NEVER, NEVER)])
         self.ahead: tuple[Entry, ...] = () if before is None else before.ahead
         for each in self.ahead:
             log.info("the last hand of this gripper has left a request on its way: %s", each.image)
             each.doubt(NEVER)
         self.match: Entry | None = None  # the one that the newest status shows
-        # When that was asked for. It may show the state of that time, however late a busy loop reads the
-        # reply; so the age of a write is measured by this.
+        # When the newest status was requested. It may show the state of that time even if a busy loop reads
+        # the reply late; so the age of a write is measured by this.
         self.now: Moment = Moment(0.0, 0)
         self.ours: Finger = NO_AXES  # the axes that may move because of us: we gave them their position
         self.requests: Final = RecentRequests(first.model)
@@ -142,7 +143,7 @@ class Ledger:
     @property
     def _coming(self) -> list[Request]:
         """The images that the gripper may still get, whatever a status shows today."""
-        # Every question about what it will do is about these. One in doubt may also never act.
+        # Every question about its next moments is about these. An image in doubt may also never act.
         return [each.image for each in self.unsettled if not self._is_past(each)]
 
     @property
@@ -170,9 +171,9 @@ class Ledger:
 
     def may_press(self, status: RobotiqStatus, since: float) -> Finger:
         """The axes that show a motion where they were in contact: not known yet whether they press again."""
-        # An axis that moves has moved off before long. One that still shows a motion after that presses. That
-        # it moves may be due to a force of another client, which no echo shows: so what counts is ``since``,
-        # when that was first asked, and not our last write alone.
+        # An axis that moves has soon moved off. One that still shows a motion after that presses. The motion
+        # may be due to a force of another client, which no echo shows: so ``since`` counts, when a hold was
+        # first due, and not our last write alone.
         is_recent = self.now.time - max(self.last.time, since) < WINDOW_S
         return self._pressing_again(status) if is_recent else NO_AXES
 
@@ -205,7 +206,7 @@ class Ledger:
         """Whether an entry in doubt would have acted by now."""
         return entry.is_doubtful and self._age(entry) >= SILENT_S
 
-    # -- what is written -------------------------------------------------------------------------------
+    # -- writes ----------------------------------------------------------------------------------------
 
     def write(
         self, image: Request, axes: Finger, now: float, *, begins: bool = False, is_early: bool = False
@@ -215,7 +216,7 @@ class Ledger:
         entry = Entry(image, image.echo, is_ours=True, sent=now, is_early=is_early)
         self.limits.forget(axes)
         self.contacts.ask(axes)
-        # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
+        # With rGTO clear gDT has no meaning, so no axis was proven to rest under earlier requests.
         self.requests.ask(entry, before, is_at_rest=before.image.go)
         self.ours |= axes
         self.ahead = (*self.ahead, entry)
@@ -244,7 +245,7 @@ class Ledger:
             self._adoption = None
         return last
 
-    # -- what is read ----------------------------------------------------------------------------------
+    # -- reads -----------------------------------------------------------------------------------------
 
     def update(self, status: RobotiqStatus, asked: float, *, is_ready: bool = False) -> None:
         """Take in a status: from then on the questions are about it. Unless it is news, axes rest by it."""
@@ -268,7 +269,7 @@ class Ledger:
             self.update_rest(status)
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
-        """The entry that a status shows, perhaps with software limits in place of its requests."""
+        """The entry that a status shows, perhaps with software limits instead of its requests."""
         # After a silence it must not show an echo of long ago: of those whose time is over the newest alone.
         old = [*takewhile(self._is_over, self.ahead)]
         while old and old[-1].is_doubtful:
@@ -280,7 +281,7 @@ class Ledger:
         if may_be_limit and self.limits.explains(self.shown, self.ahead, status, self.now.time):
             # Even so it may have to wait: while the echo has not changed, the write may not act yet.
             found = self._entry_of(status.echo, is_replaced=bool(old))
-        # This status was compared with them: those in doubt that did not show in time are dropped.
+        # This status was compared with them: entries in doubt that did not show in time are dropped.
         self.ahead = tuple([each for each in self.ahead if not (each.is_doubtful and self._is_over(each))])
         return found
 
@@ -305,7 +306,7 @@ class Ledger:
         return not may_wait and self.limits.shows(entry, echo)
 
     def _show(self, entry: Entry) -> None:
-        """An entry shows. One in doubt acts after all, and so will what was acknowledged after it."""
+        """An entry shows, so it acts even if it was in doubt, and so will entries acknowledged after it."""
         if entry.is_doubtful:
             # Images act in their order [follows]. They are compared with the image that showed until now.
             self._settle_base()
@@ -315,7 +316,7 @@ class Ledger:
                     each.believe(self.now.time)
                     self.ours |= self.requests.ask(each, before, later=self.ahead[number:])
                     before = each
-        # Those in doubt before it never will act.
+        # Entries in doubt before it will never act.
         count = self.ahead.index(entry) + 1
         self._past.extend([each for each in self.ahead[:count] if not each.is_doubtful])
         self.ahead = self.ahead[count:]
@@ -324,7 +325,7 @@ class Ledger:
         """Whether the activation or the release of an entry is over. A status may be from before it."""
         condition = classify(status)
         if not begun.image.release:
-            # A fault does not end it: the fingers may go on as that clears [conceivable].
+            # A fault does not end it: the fingers may continue when that clears [conceivable].
             return (status.is_activated or condition is Trigger.SEEN_RESET) and self.acts(begun)
         if status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE:
             return condition in (Trigger.SEEN_RESET, Trigger.SEEN_RELEASED) and self.acts(begun)
@@ -343,7 +344,7 @@ class Ledger:
         return max(abs(status.position(axis) - first.position(axis)) for axis in axes) > STRAY_COUNTS
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
-        """Make the image that a status shows the only certain entry; those ahead may act after it."""
+        """Make the image that a status shows the only certain entry; entries ahead may act after it."""
         # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
         before = self._settle_base()

@@ -1,4 +1,4 @@
-"""Software limits that a gripper echoes in place of the request.
+"""Software limits that a gripper echoes instead of the request.
 
 A limit replaces a request beyond it [manual 2014, p. 45; 2018, p. 36]; which of the two the gripper echoes is
 not said. If it echoes the limit [conceivable], the status looks as if another client had written just after
@@ -10,7 +10,7 @@ us. It counts as a limit only if
 * our own request never showed, and no other client was seen for ALONE_S.
 
 If another client writes exactly such a request within the same device cycle, it is mistaken for a limit. This
-moves nothing: in both cases our next image repeats what the status echoes. But the move then ends with the
+moves nothing: in both cases our next image repeats the echo. But the move then ends with the
 position at which the axis came to rest, and not with MoveSupersededError.
 """
 
@@ -36,10 +36,10 @@ _FIRST: Final = 2  # index of the first position in an echo
 
 
 class Limits:
-    """The limits that have been echoed in place of requests."""
+    """The limits that have been echoed instead of requests."""
 
     def __init__(self, log: Log = log) -> None:
-        self.limited: dict[Finger, int] = {}  # by axis, the limit that shows in place of the last request
+        self.limited: dict[Finger, int] = {}  # by axis, the limit that shows instead of the last request
         self._log: Final = log
         # By axis, and whether it limits closing: the limit, and whether an axis has come to rest there.
         self.known: dict[tuple[Finger, bool], tuple[int, bool]] = {}
@@ -50,7 +50,7 @@ class Limits:
         self.limited = {axis: at for axis, at in self.limited.items() if axis not in axes}
 
     def shows(self, entry: Entry, echo: Echo) -> bool:
-        """Whether an echo shows an entry with limits in place of its requests."""
+        """Whether an echo shows an entry with limits instead of its requests."""
         limits = self.apply(entry.image)
         return bool(limits) and entry.image.with_positions(limits).echo == echo
 
@@ -61,7 +61,7 @@ class Limits:
         return is_alone and any(self.learn(shown.image, each.image, status) for each in waiting)
 
     def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
-        """If an entry shows as limits in place of requests, make it an entry of these limits."""
+        """If an entry shows as limits instead of requests, make it an entry of these limits."""
         limits = self.apply(entry.image)
         if echo == entry.echo:  # it is refuted by an image that shows as it was written
             self.known = {key: known for key, known in self.known.items() if key[0] not in limits}

@@ -1,4 +1,4 @@
-"""Requests of callers: changes for the next write, those in flight, and the calls that wait for an answer.
+"""Requests of callers: changes for the next write, changes in flight, and the calls that wait for an answer.
 
 All requests between two writes are merged into one; the last value wins. Over a lost link a hold alone
 remains, unless a status has shown its write. One without a caller goes if another client takes the axis over.
@@ -33,7 +33,7 @@ class Pending:
     # Axes to hold if they move. A position of the same axis goes before it, but does not end it: if the link
     # goes down before the write, the hold remains and the position does not.
     hold: Finger = NO_AXES
-    # When the hold was first about to be written: what may press on a part is held later, or not at all.
+    # When the hold was first about to be written: an axis that may press is held later, or not at all.
     hold_began: float = math.inf
 
     @property
@@ -46,11 +46,11 @@ class Pending:
         return Finger(sum(self.positions))
 
     def held_later(self, axes: Finger) -> Pending:
-        """The hold of those of these axes that are not moved, for a later write."""
+        """The hold of the axes among these that are not moved, for a later write."""
         return Pending(hold=self.hold & ~self.moved & axes, hold_began=self.hold_began)
 
     def merged(self, new: Pending) -> Pending:
-        # The last value wins, per axis and field; an axis keeps what a command does not name.
+        # The last value wins, per axis and field; an axis keeps the values that a command does not name.
         return replace(
             self,
             positions={**self.positions, **new.positions},
@@ -87,14 +87,14 @@ class OpenRequests:
 
     @property
     def has_caller(self) -> bool:
-        """Whether there is more to write, or to acknowledge, than holds of our own making."""
+        """Whether there is more to write, or to acknowledge, than holds without a caller."""
         return self.pending.has_changes or self._sent.has_changes or any(call.held for call in self.calls)
 
     @property
     def has_undelivered_hold(self) -> bool:
         return bool(self.pending.hold or self._sent.hold)
 
-    # -- what is asked ---------------------------------------------------------------------------------
+    # -- requests --------------------------------------------------------------------------------------
 
     def command(self, command: Pending, waiter: Waiter[None] | None = None) -> None:
         # Few loops at 200 Hz have a move to end.
@@ -110,7 +110,7 @@ class OpenRequests:
         self._followed.update(dict.fromkeys(move.axes, move))
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
-        """Hold those axes that move. It supersedes what moves them."""
+        """Hold axes that move. It supersedes the requests that move them."""
         self.supersede(axes, why)
         self.merge_hold(axes, why if waiter is None else "")
         if waiter is not None:
@@ -121,21 +121,21 @@ class OpenRequests:
         self.calls.append(Call(waiter, halts=True))
 
     def merge_hold(self, axes: Finger, why: str = "") -> None:
-        """Hold those axes that move; ``why`` is for the log, if no caller has asked for it."""
+        """Hold axes that move; ``why`` is for the log, if no caller has requested it."""
         if axes and why:
-            self._log.info("%s: what moves of %s is held", why, axes)
+            self._log.info("%s: the moving axes of %s are held", why, axes)
         pending = self.pending
         began = math.inf if axes & ~pending.hold else pending.hold_began  # an axis more has its own time
         self._keep(replace(pending, hold=pending.hold | axes, hold_began=began))
 
     def begin_hold(self, now: float) -> Pending:
-        """The hold is about to be written; return what is pending, with when it first was."""
+        """The hold is about to be written; return the pending changes, with the time of its first attempt."""
         if self.pending.hold_began == math.inf:
             self.pending = replace(self.pending, hold_began=now)
         return self.pending
 
     def hold_only(self, axes: Finger) -> None:
-        """Drop all holds but those of these axes, and those that callers of hold() wait for."""
+        """Drop all holds but the holds of these axes, and the holds that callers of hold() wait for."""
         for call in self.calls:
             axes |= call.held if call.entry is None else NO_AXES
         self._keep(replace(self.pending, hold=self.pending.hold & axes))
@@ -145,7 +145,7 @@ class OpenRequests:
 
     def supersede(self, axes: Finger, why: str) -> None:
         """End the moves of these axes, and the calls that would move one of them and are not sent."""
-        # Of a call for several axes the others are sent all the same.
+        # The other axes of a call for several axes are still sent.
         positions = {axis: at for axis, at in self.pending.positions.items() if axis not in axes}
         self._keep(replace(self.pending, positions=positions))
         self._take_over(axes, why, [call for call in self.calls if call.entry is None and call.axes & axes])
@@ -164,10 +164,10 @@ class OpenRequests:
             self.moves = [move for move in self.moves if move not in calls]
         return [call.waiter for call in calls]
 
-    # -- what becomes of it ----------------------------------------------------------------------------
+    # -- outcomes --------------------------------------------------------------------------------------
 
     def sending(self, entry: Entry, left: Pending) -> None:
-        """An entry has what is pending, but for what is left. While a halt is open, no other is sent."""
+        """An entry has the pending changes but for ``left``. While a halt is open, no other is sent."""
         keeps = left.has_changes
         has_sent = self.pending.has_changes and not keeps
         self._sent = self.pending if has_sent else Pending(hold=self.pending.hold & ~left.hold)
@@ -184,8 +184,8 @@ class OpenRequests:
             resolve(self._close([call for call in self.calls if call.entry is not None and not call.halts]))
 
     def answer_halts(self, ledger: Ledger, status: RobotiqStatus, *, is_over: bool) -> None:
-        """Answer the callers of halts if these are over, and those that have waited too long in any case."""
-        # However often a halt is replaced by a newer one, its callers do not wait for ever.
+        """Answer the callers of halts that are over, and in any case callers that have waited too long."""
+        # A halt may be replaced by newer halts again and again: its callers do not wait for ever.
         since = ledger.now.time - MOST_HALTS * WINDOW_S
         halts = [each for each in self.calls if each.halts]
         halts = [each for each in halts if is_over or (each.entry is not None and each.entry.time <= since)]
@@ -218,8 +218,8 @@ class OpenRequests:
         return is_open, Finger(sum(axes))
 
     def drop(self, *, holds: bool) -> list[Waiter[Any]]:
-        """Drop all that would move an axis, with ``holds`` also what is to stop one; return the callers."""
-        # A write may be on the line all the same. Holds of our own making go in any case.
+        """Drop all requests that move an axis, with ``holds`` also holds and halts; return the callers."""
+        # A write may still be on the line. Holds without a caller are always dropped.
         calls = [call for call in self.calls if holds or not (call.held or call.halts)]
         dropped = self._close([*calls, *self.moves])
         self._followed.clear()
@@ -234,7 +234,7 @@ class OpenRequests:
 
     def lost(self, error: RobotiqError, ahead: Sequence[Entry]) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
-        # A hold of our own making has no caller to get the error. The entries ``ahead`` have not shown: a UR
+        # A hold may have no caller to get the error. The entries ``ahead`` have not shown: a UR
         # may acknowledge a SET, lose it, and lose its link next.
         hold = self.pending.hold
         for each in ahead:

@@ -1,11 +1,11 @@
 """Activation and automatic release, each as a generator.
 
-A procedure is sent a status and yields the image to write now, or None. After an image, the next status it is
-sent is one that can show the effect. The first status decides whether the procedure begins at all: another
-client may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller
-limits its time. It never yields its image again, even if a gripper may have forgotten it: the image moves the
-fingers. It returns why it has failed, if it has. An activation may outlast it: one that a fault has stopped
-may continue as that clears, and one whose link was lost continues. The ledger keeps it.
+A procedure is sent a status and yields the image to write now, or None. After an image, the next status that
+it is sent can show the effect. The first status decides whether the procedure begins at all: another client
+may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller limits its
+time. It never yields its image again, even if a gripper may have forgotten it: the image moves the fingers.
+It returns why it has failed, if it has. An activation may outlast it: one that a fault has stopped may
+continue as that clears, and one whose link was lost continues. The ledger keeps it.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from .ledger import WINDOW_S, Ledger
 from .stops import Duty, Ended
 
 RESET_S: Final = 5.0
-"""Time for a stranded gripper to show a reset: as long as reset() waits for one."""
+"""Time for a stranded gripper to show a reset: as long as reset() waits."""
 
 Steps = Generator[Request | None, RobotiqStatus, str]
 Image = Callable[[RobotiqStatus], Request]  # makes the image to begin from, given the newest status
 
 
 class Procedure(Duty):
-    """An activation or an automatic release. If it has no image to send, what shows counts as its write."""
+    """An activation or an automatic release. With no image to send, the shown image counts as its write."""
 
     def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:
         self.releases = begin is automatic_release
@@ -39,7 +39,7 @@ class Procedure(Duty):
         of_release, of_activation = (State.DO_ATR, State.WF_ATR), (State.DO_ACTIVATION, State.WF_ACTIVATION)
         super().__init__(of_release if self.releases else of_activation)
         self._steps: Final = begin(lambda status: at_rest(ledger.base, status))
-        next(self._steps)  # to its first yield: what the gripper shows decides whether it begins
+        next(self._steps)  # to its first yield: the first status decides whether it begins
 
     def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
         """The image to write now; None if it waits."""

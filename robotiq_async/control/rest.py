@@ -3,12 +3,13 @@
 gDT and gSTA are valid once the echo shows [manual 2014, pp. 70, 84]. In the vendor's own software for the
 two-finger grippers they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
 acts may be from before it. It counts at once if it can result from no other request than the last; if it
-says "at position" and the axis is where it was last asked to be, as a position is never late; or if it is a
+says "at position" and the axis is at its last request, as a position is never late; or if it is a
 contact that no request contradicts since it was true. In any case it counts when the lag is over.
 docs/decisions/late-status.md has the reasons.
 
-A hold acts a device cycle after it was sent. Asked for where it was seen, an axis would drive back, 20 counts
-if the cycle is 0.2 s. So it is asked for where it will be, as far as statuses tell.
+A hold acts a device cycle after it was sent. With its last position as request an axis would drive back, 20
+counts if the cycle is 0.2 s. So the request is the position that the axis will have, as far as statuses show
+it.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ SPACING_S: Final = 0.02
 
 
 def agrees(model: Model, request: int, what: ObjectStatus, position: int, direction: int) -> bool:
-    """Whether what an axis shows at a position can result from a request; positions are in counts."""
+    """Whether an object status at a position can result from a request; positions are in counts."""
     # ``direction`` is above 0 closing, below 0 opening, 0 unknown; it is used only while the axis moves.
     # gDT says that an axis has stopped before its request, and in which direction it was going [manual 2014,
     # p. 51; 2018, p. 39]. One at its request may be off by the model's tolerance [manual: up to 2 counts].
@@ -61,10 +62,10 @@ def agrees(model: Model, request: int, what: ObjectStatus, position: int, direct
 
 
 def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger = NO_AXES) -> bool:
-    """Whether an axis moves or is about to, so that a hold must ask for its present position."""
-    # An axis may still show what the request before this one made it do: then the two disagree. ``may_move``
+    """Whether an axis moves or is about to, so that a hold must request its present position."""
+    # An axis may still show the effect of an earlier request: then the two disagree. ``may_move``
     # has the axes that show rest, and may move because of an earlier request. A needless hold would cost an
-    # axis in contact its grip: it would be asked for where it is.
+    # axis in contact its grip: its request would become its present position.
     if axis in may_move:
         return base.position(axis) != status.position(axis)
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
@@ -72,13 +73,13 @@ def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger 
 
 
 class Moment(NamedTuple):
-    """The time at which a status was asked for, in monotonic seconds and in statuses read."""
+    """The time at which a status was requested, in monotonic seconds and in statuses read."""
 
     time: float
     reads: int
 
     def is_lag_over(self, now: Moment) -> bool:
-        """Whether a status asked for at ``now`` cannot show anything from before this moment."""
+        """Whether a status requested at ``now`` cannot show anything from before this moment."""
         return now.time - self.time >= LAG_S and now.reads - self.reads >= LAG_READS
 
 
@@ -114,8 +115,8 @@ class Rest(Enum):
     """The certainty with which an axis that shows rest is at rest."""
 
     UNKNOWN = "it may move, or be about to"
-    KNOWN = "it is where it was asked to be; a status from before its request may still come"
-    PROVEN = "what it shows is from after its last request, so that no older status can follow"
+    KNOWN = "it is at its request; a status from before its request may still come"
+    PROVEN = "its status is from after its last request, so that no older status can follow"
 
 
 def rest_of(targets: Sequence[Target], model: Model, what: ObjectStatus, position: int) -> Rest:
@@ -129,7 +130,7 @@ def rest_of(targets: Sequence[Target], model: Model, what: ObjectStatus, positio
         # gDT results from the only request that is left, even if it contradicts it: the axis may be at a
         # software limit, or blocked.
         return Rest.PROVEN
-    if what is ObjectStatus.AT_POSITION:  # within its tolerance, whatever the age of gDT
+    if what is ObjectStatus.AT_POSITION:  # within its tolerance, at any age of gDT
         return Rest.KNOWN if last.fits(model, what, position) else Rest.UNKNOWN
     is_true = _is_true_since(targets, model, what, position, unless_again=True)
     return Rest.PROVEN if is_true else Rest.UNKNOWN
@@ -175,7 +176,7 @@ class RecentRequests:
     def ask(
         self, entry: Entry, before: Entry, *, is_at_rest: bool = False, later: Sequence[Entry] = ()
     ) -> Finger:
-        """An image asks for something else than the one before it; return the axes of which it does.
+        """Note an image with other requests than the one before; return the axes with other requests.
 
         It acts before the ``later`` entries. With ``is_at_rest`` other axes have proven to rest until now.
         """
@@ -203,7 +204,7 @@ class RecentRequests:
         return changed
 
     def lose(self, entry: Entry) -> None:
-        """The newest entry may act, or never: what moves its axes is not known."""
+        """The newest entry may act, or never: the request that moves its axes is not known."""
         for axis, targets in self.targets.items():
             if targets[-1].entry is entry:
                 targets.pop()
@@ -213,7 +214,7 @@ class RecentRequests:
                     targets.insert(0, Target(axis, None))
 
     def overtake(self, now: Moment) -> None:
-        """Another client's image shows: what does not act yet may have acted until now, unseen."""
+        """Another client's image shows: entries that do not act yet may have acted until now, unseen."""
         for targets in self.targets.values():
             for each in targets:
                 if each.since is None:
@@ -272,15 +273,15 @@ def _forget_old(targets: list[Target], now: Moment) -> None:
 
 @cache
 def yields(model: Model) -> int:
-    """The counts that an axis in contact may go on without having moved off."""
+    """The counts that an axis in contact may move without having moved off."""
     return max(TOLERANCE, int(PAD_MM * model.stroke.counts / model.stroke.mm))
 
 
 class Contacts:
     """The place where each axis was last seen in contact, until it has moved off: these may press.
 
-    An axis in contact that is asked to press on keeps its request, and with it its grip: when others are
-    held, and when rGTO rises (gDT shows no contact while that is clear; what becomes of a grip then is
+    An axis in contact whose request lies beyond the part keeps that request, and with it its grip: when
+    others are held, and when rGTO rises (gDT shows no contact while rGTO is clear; the fate of a grip then is
     unknown [conceivable]). More force and a rising rGTO make it press again: for a while it shows a motion
     and stays where it is [conceivable]. Until a contact shows, or it has moved off, that is open.
     """
@@ -290,7 +291,7 @@ class Contacts:
         self.open: Finger = NO_AXES
 
     def see(self, status: RobotiqStatus, contacts: Finger) -> None:
-        """Take in a status with gGTO = 1, and those of its contacts that can be believed."""
+        """Take in a status with gGTO = 1, and its credible contacts."""
         before, self.open = self.shown, NO_AXES
         self.shown = dict.fromkeys(contacts, status)
         for axis in before.keys() - self.shown.keys():  # usually none
@@ -300,7 +301,7 @@ class Contacts:
                 self.open |= axis
 
     def ask(self, axes: Finger) -> None:
-        """Axes are asked for a position, perhaps the same: what they do next is open."""
+        """Axes get a position request, perhaps the same: their next motion is open."""
         self.open |= axes
 
     def forget(self) -> None:
@@ -308,7 +309,7 @@ class Contacts:
         self.shown = {}
 
     def pressing(self, status: RobotiqStatus, base: Request) -> Finger:
-        """The axes that have not moved since, and that ``base`` asks to press on."""
+        """The axes that have not moved since, and whose request in ``base`` presses."""
         pressing = NO_AXES
         for axis, shown in self.shown.items():
             what, at = shown.finger_status(axis), shown.position(axis)
@@ -322,8 +323,8 @@ class Course:
     """Some of the statuses in which an axis moves: how far it will have gone when a write acts."""
 
     def __init__(self) -> None:
-        # Each with the time at which it was asked for: a loop that is held up reads a reply late, and a speed
-        # by the times of the replies would drive a held axis on to its request.
+        # Each with the time of its request: a loop that is held up reads a reply late, and a speed from the
+        # times of the replies would drive a held axis on to its request.
         self._kept: Final[deque[tuple[float, RobotiqStatus]]] = deque(
             maxlen=math.ceil(BASELINE_S / SPACING_S)
         )
@@ -335,7 +336,7 @@ class Course:
     def after(self, axis: Finger, request: int, status: RobotiqStatus, asked: float, seconds: float) -> int:
         """Its position so long after a status, on its way to a request; as it shows if it may stand.
 
-        The status was asked for at ``asked``.
+        The status was requested at ``asked``.
         """
         at, since, first = status.position(axis), asked, status
         # A fault stops the axes, and gDT shows a motion.

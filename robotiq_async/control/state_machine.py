@@ -1,7 +1,7 @@
 """The state of a hand, and whether a person has inhibited its motion.
 
 The table in values/states.py has which state may follow which. Beside it stands a condition that a person
-sets, :class:`Inhibit`: then all that may move an axis or make it press is refused, whatever the state.
+sets, :class:`Inhibit`: then all that may move an axis or make it press is refused, in every state.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ class StateMachine:
     def __init__(self, log: Log = log) -> None:
         self.log = log
         self.changed: Callable[[State, State, Trigger], None] = lambda *_: None
-        self.why_down: object = None  # why the link is down, for the error of what is refused then
+        self.why_down: object = None  # why the link is down, for the errors of refused calls
         self.state: State = State.DISCONNECTED  # only show() sets it
         self.inhibited: Inhibit | None = None  # only inhibit() and permit() set it; outlasts runs
 
     def ask(self, trigger: Trigger, status: RobotiqStatus | None = None, *, presses: bool = True) -> bool:
-        """Whether there is anything to do for what is asked. Raises the error if the table refuses it.
+        """Whether there is anything to do for a call. Raises the error if the table refuses the call.
 
         ``presses`` is False for a command that neither moves an axis nor makes it press more.
         """
         return check(trigger, self.state, status, self.inhibited if presses else None, why_down=self.why_down)
 
     def inhibit(self, inhibit: Inhibit) -> None:
-        """Refuse what may move or press from here on. The first reason stays, and each halt counts."""
+        """Refuse all calls that may move or press. The first reason stays, and each halt counts."""
         if self.inhibited is not None:
             self.inhibited = self.inhibited.again()
             return
@@ -43,7 +43,7 @@ class StateMachine:
         self.log.warning("%s; a person permits it again", inhibit)
 
     def permit(self, who: str, seen: Inhibit | None = None) -> None:
-        """Refuse nothing more. What was refused is forgotten.
+        """Refuse nothing more. Refused calls are not repeated.
 
         Raises RobotiqStateError if a person saw another inhibit than the one in force.
         """
@@ -83,5 +83,5 @@ class StateMachine:
         self.changed, self.why_down = changed, None
 
     def note_down(self, why: object) -> None:
-        """The link is down, for the error of what is refused then."""
+        """Note why the link is down, for the errors of refused calls."""
         self.why_down = why

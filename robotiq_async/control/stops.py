@@ -1,4 +1,4 @@
-"""Stops: a halt, a reset, and what ends a hand. Each has a level; a new one replaces the one before.
+"""Stops: a halt, a reset, and the end of a hand. Each has a level; a new stop replaces the one before.
 
 The first write of a stop leaves before the read of its cycle: a gripper may obey and not answer. It may also
 acknowledge a write that comes soon after another one and forget it [manual 2014, pp. 58, 75: space them by
@@ -11,13 +11,13 @@ acknowledge a write that comes soon after another one and forget it [manual 2014
 #             drives the fingers
 # HALT        halt()                            rGTO = 0             it shows, or was written twice
 # SHUTDOWN    the end of the hand               rGTO = 0             its whole echo shows
-# Keeping     the same, to keep a grip          holds what moves     every axis rests; in any doubt a
+# Keeping     the same, to keep a grip          holds moving axes    every axis rests; in any doubt a
 #                                                                    SHUTDOWN replaces it
 # Procedure   activate(), atr()                 rACT or rATR = 1     it has ended or failed, see there
 #
 # A hand has one duty or none: then the pending changes are written. A new duty replaces the one before, and a
 # lost link ends it. A halt takes a device cycle, and a status counts meanwhile as ever; in all others it
-# counts for the duty alone, and the condition counts again afterwards. A duty is asked twice in a cycle: in
+# counts for the duty alone, and the condition counts again afterwards. A duty is called twice in a cycle: in
 # see() after the read, and in next_image() in the turn of the loop in which the link writes.
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Duty:
 
     @property
     def state(self) -> State | None:
-        """The state of the hand that it makes; None if that is what the gripper shows."""
+        """The state of the hand during the duty; None if the gripper's condition decides it."""
         return None if self._states is None else self._states[self.is_delivered]
 
     @property
@@ -81,7 +81,7 @@ class Stop(Duty):
         super().__init__((State.DO_RESET, State.WF_RESET) if level is StopLevel.RESET else None)
         self.level: Final = level
         self.is_halt = level is StopLevel.HALT
-        self._was_active = False  # before its first write: what activates already is not ours to take back
+        self._was_active = False  # before its first write: only our own activation is taken back
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its first write leaves before the next read."""
@@ -89,7 +89,7 @@ class Stop(Duty):
 
     def has_cause(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether there is anything to stop."""
-        # The hand ends: what does not act yet may set rGTO, or activate.
+        # The hand ends: a write that does not act yet may set rGTO, or activate.
         is_asked = self.level in (StopLevel.HALT, StopLevel.RESET)
         return is_asked or status.go_echo or not ledger.is_settled
 
@@ -99,16 +99,16 @@ class Stop(Duty):
             self._was_active = status.is_activated
             return self.first_image(ledger, status) if self.has_cause(ledger, status) else Ended()
         last = self.writes[-1]
-        # An early one whatever shows: the gripper may yet forget it.
+        # An early write is always repeated: the gripper may yet forget it.
         return last.image if last.is_early or (self._rules(status)[0] and ledger.acts(last)) else None
 
     def first_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
-        if self.level is StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
+        if self.level is StopLevel.RESET:  # rACT = 0 clears faults and ends sequences [manual 2012, 4.6]
             return replace(at_rest(ledger.base, status), activate=False)
         is_foreign = self.level is StopLevel.SHUTDOWN and ledger.match is None
         if is_foreign and classify(status) is Trigger.SEEN_READY:
-            ledger.adopt(status)  # stop the fingers whichever client moves them
-        # Positions and speeds stay as they were asked, and what is active stays so: the gate sees to rACT.
+            ledger.adopt(status)  # stop the fingers even if another client moves them
+        # Positions and speeds stay as requested, and an active gripper stays active: the gate sees to rACT.
         return replace(ledger.base, activate=True, go=False)
 
     def _rules(self, status: RobotiqStatus) -> tuple[bool, bool]:
@@ -127,7 +127,7 @@ class Stop(Duty):
                 # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo
                 # that is about to change.
                 return is_safe, is_reset or status.echo == entry.echo
-        return False, False  # what moves is held once
+        return False, False  # moving axes are held once
 
     def see(self, ledger: Ledger, status: RobotiqStatus) -> Stop | None:
         """Take in a status; return the stop from then on, or None once this one is over."""
@@ -149,15 +149,15 @@ class Stop(Duty):
 class Keeping(Stop):
     """The weakest stop: leaves rGTO set if every axis is seen at rest under a known request.
 
-    Clearing rGTO is what stops the fingers for certain, but what then becomes of a grip is in no public
-    source. Axes that move are held first, once. docs/decisions/keeping-a-grip.md has the reasons.
+    Only a cleared rGTO stops the fingers for certain, but no public source says whether a grip then stays.
+    Axes that move are held first, once. docs/decisions/keeping-a-grip.md has the reasons.
     """
 
     def __init__(self, status: RobotiqStatus, why_no_grip: str, log: Log) -> None:
         super().__init__(StopLevel.KEEP)
         self._log: Final = log
         self._why_no_grip: Final = why_no_grip  # if it is known from the beginning
-        # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
+        # Rest is timed from the request of a status, because a busy loop may read the reply late.
         self._until: Final = status.timestamp + KEEP_S
         self._since = math.inf
 
@@ -165,7 +165,7 @@ class Keeping(Stop):
         """Return a shutdown in any doubt, this one, or None once every axis rests."""
         ledger.update_rest(status)
         why = self._why_no_grip
-        if not self.writes or ledger.acts(self.writes[-1]):  # if not, a hold will overwrite what shows
+        if not self.writes or ledger.acts(self.writes[-1]):  # if not, a hold will overwrite the present image
             why = why or self._doubt(ledger, status)
             self._since = min(self._since, ledger.now.time) if self._rests(ledger, status) else math.inf
         if why:
@@ -207,7 +207,7 @@ class Keeping(Stop):
         # A late object status is worth a wait. A write in doubt is not.
         is_late = not status.moving and status.timestamp < self._until
         if ledger.has_recent_doubt or (not ledger.is_certain and not is_late):
-            return "what the gripper was asked is not known for certain"
+            return "the request of the gripper is not known for certain"
         if ledger.is_settled and not status.go_echo:
             return "rGTO was clear"
         if status.timestamp >= self._until and not self._rests(ledger, status):

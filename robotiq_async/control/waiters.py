@@ -35,10 +35,10 @@ class Call:
     """A caller that waits: for the acknowledgement of a command or a hold, or the end of a move or a halt."""
 
     waiter: Waiter[Any]
-    axes: Finger = NO_AXES  # those that it moves
-    held: Finger = NO_AXES  # those that it has named to be held: they are, whichever client moves them
+    axes: Finger = NO_AXES  # the axes that it moves
+    held: Finger = NO_AXES  # the axes that it holds, also if another client moves them
     halts: bool = False  # it waits for the end of a halt
-    entry: Entry | None = None  # the write that has what it asked for
+    entry: Entry | None = None  # the write with its request
 
     def written(self, entry: Entry) -> None:
         self.entry = entry
@@ -54,7 +54,7 @@ class Move(Call):
         self._peak: Final = dict.fromkeys(axes, 0)
 
     def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
-        """Whether a status echoes the target for every axis of the move, or the limit in place of it."""
+        """Whether a status echoes the target for every axis of the move, or the limit instead."""
         # rGTO = 0 echoes positions, too, and none of them is followed [manual 2014, pp. 50, 54].
         return status.go_echo and all(
             status.requested_position(axis) == limited.get(axis, self.position) for axis in self.axes
@@ -90,7 +90,7 @@ def resolve(waiters: Iterable[Waiter[None]]) -> None:
 
 
 def fail(waiters: Iterable[Waiter[Any]], error: RobotiqError) -> None:
-    """Give each caller an error of its own: a raised error collects the traceback of its caller."""
+    """Give each caller a separate error: a raised error collects the traceback of its caller."""
     for waiter in waiters:
         if not waiter.done():
             copied = copy.copy(error)

@@ -112,8 +112,8 @@ class Hand(HandKind):
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
-        rGTO does not end an activation or a release: one that this hand has begun is ended by a reset (rACT =
-        0), and the part is let go. Those of other clients, and an emergency release, continue.
+        rGTO does not end an activation or a release. If this hand has begun it, a reset ends it (rACT = 0),
+        and the part is let go. Sequences of other clients, and an emergency release, continue.
 
         The stop is final from the call on: every request is refused with NotStartedError, requests that were
         not sent are dropped, and every other wait ends with NotStartedError. Nothing

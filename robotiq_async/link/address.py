@@ -75,7 +75,7 @@ class LineSettings:
 
     Attributes:
         baud: bits a second, 9600..1000000.
-        parity: "N" for none, "E" for even, "O" for odd.
+        parity: "N" (no parity bit), "E" (even) or "O" (odd).
         stopbits: 1 or 2.
     """
 
@@ -123,7 +123,7 @@ class Address:
         stroke: absolute path of a file with measured openings, which is read when a hand is made; None for
             nominal ones.
         scheme: of a tunnel; empty for the others, and for a tunnel that is an object.
-        options: those that are for the tunnel alone, names and values.
+        options: names and values of options for the tunnel alone.
     """
 
     kind: LinkKind
@@ -161,7 +161,7 @@ class Address:
 
 
 def own_options(options: Iterable[tuple[str, str]]) -> str:
-    """The options of a tunnel as they are written, with the question mark before them; empty for none."""
+    """The options of a tunnel as they are written, with the question mark before them; may be empty."""
     written = "&".join(f"{name}={value}" for name, value in options)
     return f"?{written}" if written else ""
 
@@ -225,7 +225,7 @@ _SCHEME_FORM: Final = re.compile("[a-z][a-z0-9+.-]*")
 
 
 def entry_of(scheme: str) -> EntryPoint | None:
-    """The entry point of an installed package under a scheme; None if there is none. It is not loaded.
+    """The entry point of an installed package under a scheme, or None. It is not loaded.
 
     Raises:
         ValueError: several packages name the same.
@@ -240,7 +240,7 @@ def entry_of(scheme: str) -> EntryPoint | None:
 
 
 def _through_a_tunnel(scheme: str, rest: str, model: Model | None, stroke: str | None) -> Address:
-    """An address of a package; only this one knows its options."""
+    """An address of a package; only the package knows its options."""
     if entry_of(scheme) is None:
         raise ValueError(f"no package here has {scheme}://; accepted: {FORMS}")
     place, _, query = rest.partition("?")
@@ -295,7 +295,7 @@ def _without(name: str, text: str, form: str) -> tuple[str, str | None]:
 
 
 def _split(text: str) -> tuple[str, str, str]:
-    """A place, the question mark after it if there is one, and the options."""
+    """A place, the question mark after it (or ""), and the options."""
     begin = _WINDOWS_PATH if text.startswith(_WINDOWS_PATH) else ""
     place, mark, query = text.removeprefix(begin).partition("?")
     return begin + place, mark, query
@@ -375,9 +375,9 @@ def _is_ipv4(host: str) -> bool:
 
 
 def _ends_in_a_number(host: str) -> bool:
-    """Whether resolvers take a host for an IPv4 address, in whatever spelling: 127.1, 0x7f000001.
+    """Whether resolvers take a host for an IPv4 address, in any spelling: 127.1, 0x7f000001.
 
-    They do not agree on all of them: 192.168.1.011 ends in 9 for one and in 11 for another.
+    They do not agree on all spellings: 192.168.1.011 ends in 9 for one resolver and in 11 for another.
     """
     return re.fullmatch(r"[0-9]+|0x[0-9a-f]*", host.removesuffix(".").rpartition(".")[2]) is not None
 

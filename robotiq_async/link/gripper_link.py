@@ -44,7 +44,7 @@ class Gripper:
 
     Attributes:
         place: the same for all spellings of its address.
-        unit: the unit id that was given; None if none was, or if only one hand can own the place.
+        unit: the given unit id; None without one, or if only one hand can own the place.
         hint: for the error message, in case two grippers were meant.
         is_on_line: whether the place is a serial line, whose connection one event loop must own.
     """
@@ -73,7 +73,7 @@ class GripperLink:
         make: makes a transport for one start of the hand, from ``connect_timeout`` and ``response_timeout``.
         is_slow: whether a status takes a good part of a poll interval: over a serial line, or in questions.
         model: of the gripper.
-        stroke: path of a file with measured openings that the address names; None if it names none.
+        stroke: path of the file with measured openings in the address, or None.
     """
 
     address: str
@@ -105,7 +105,7 @@ def gripper_link(
         address: a string or a tunnel.
         registers: the options that :func:`registers_of` takes.
         name: of the hand, for the log; empty for the address.
-        model: a Model or its name; None for that of the address.
+        model: a Model or its name; None for the model of the address.
     """
     if isinstance(address, str):
         parsed = parse_address(address)
@@ -204,7 +204,7 @@ class Claims(Generic[T, L]):
         self._left: OrderedDict[Gripper, L] = OrderedDict()  # the newest last
 
     def claim(self, gripper: Callable[[], Gripper], owner: T, is_over: Callable[[T], bool]) -> T | None:
-        """Claim a gripper for the running loop; return its present owner if it has one.
+        """Claim a gripper for the running loop; return its present owner, or None.
 
         Args:
             gripper: identifies it; called again for each later claim, because a serial port may be renamed.

@@ -55,14 +55,14 @@ class Lost(Outcome):
 
 
 Answer = bytes | Outcome
-"""The answer to a request, or its outcome without one."""
+"""The answer to a request, or the outcome of a request without an answer."""
 
 
 def check(answer: Answer) -> bytes:
     """Return an answer.
 
     Raises:
-        RobotiqConnectionError: there is none.
+        RobotiqConnectionError: there is no answer.
     """
     if isinstance(answer, Outcome):
         raise answer.error

@@ -44,7 +44,7 @@ def registers_of(
 
 
 def check_urcap(address: Address, options: Mapping[str, object]) -> None:
-    """Refuse what a gripper behind a URCap cannot be, and options that mean nothing there.
+    """Refuse models that cannot be behind a URCap, and options that mean nothing there.
 
     Raises:
         ValueError: the model has more than one axis or is not named, or an option is one of Modbus.

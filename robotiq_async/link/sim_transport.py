@@ -52,7 +52,8 @@ def named(gripper: SimulatedGripper, address: Address) -> str:
 def simulated(address: str) -> SimulatedGripper | None:
     """The gripper in this program behind the :attr:`~robotiq_async.hands.Hand.address` of a hand.
 
-    For those who draw it. None for every other address: a real gripper, and a simulated one elsewhere.
+    For viewers that draw them. None for every other address: a real gripper, or a simulated gripper
+    elsewhere.
     """
     return _GRIPPERS.get(address)
 
@@ -121,7 +122,7 @@ class SimulatedTransport:
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
-        """Raise the error in the bodies of the gripper in place of that of the connection, which it ended."""
+        """Raise the error of the gripper's bodies, which has ended the connection, instead of its error."""
         try:
             yield
         except RobotiqConnectionError as error:

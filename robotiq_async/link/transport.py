@@ -56,9 +56,9 @@ class Link(Protocol):
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write the image that ``decide`` returns, exactly once, if it returns one.
 
-        A write may have to wait for the silence between the frames of a serial line, or for its turn on one
-        that others use. A request that stops the hand in that time must still count, so ``decide`` is called
-        in the turn of the event loop in which the write leaves.
+        A write may have to wait for the silence between the frames of a serial line, or for its turn on a
+        line that others use. A request that stops the hand in that time must still count, so ``decide`` is
+        called in the turn of the event loop in which the write leaves.
 
         Returns:
             Whether something was written, and acknowledged.

@@ -54,7 +54,7 @@ class Publisher:
         self._ended: list[tuple[Waiter[Any], RobotiqError]] = []  # the callers whom a request has ended
 
     def note(self, change: Transition, wake: Callable[[], None] | None) -> None:
-        """Note a change of state, to be published after the present call; ``wake`` is called before that."""
+        """Note a change of state, to be published after the present call; ``wake`` is called before."""
         self._news.reached(change)
         self._queue.append((self._channels.transitions, change, wake))
 

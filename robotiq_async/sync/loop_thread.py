@@ -16,7 +16,7 @@ fingers. It passes calls with :meth:`~asyncio.loop.call_soon_threadsafe` and wai
 #                  it had begun. So no call is made twice
 #
 # A caller that is interrupted gives its call up. If it has not begun, it never does; else it is cancelled.
-# After that ``interrupted`` runs, which holds the fingers. The caller waits for both, GIVE_UP_S at most.
+# Then ``interrupted`` runs, which holds the fingers. The caller waits for both, GIVE_UP_S at most.
 
 from __future__ import annotations
 

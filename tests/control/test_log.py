@@ -54,8 +54,8 @@ def test_a_hold_that_no_caller_has_asked_for_tells_its_reason(
     scan.move(200, A, speed=0)
     scan.run(0.1)
     happens(scan)
-    told = [each.message for each in caplog.records if "what moves of" in each.message]
-    assert [each.partition(": what moves of ")[0] for each in told] == ([why] if why else [])
+    told = [each.message for each in caplog.records if "the moving axes of" in each.message]
+    assert [each.partition(": the moving axes of ")[0] for each in told] == ([why] if why else [])
 
 
 def test_a_halt_that_is_a_reset_tells_so(scan: Scan, caplog: pytest.LogCaptureFixture) -> None:

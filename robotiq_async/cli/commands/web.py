@@ -45,8 +45,8 @@ async def web(
 
     It prints the address to open; the token in the address lets its users in. The page
     only watches, unless --control is given: then it has buttons, and a halt that is also on
-    the space bar. Nothing moves until one is pressed. With several addresses there is a
-    tile for each.
+    the space bar. Nothing moves until a button is pressed. With several addresses there is
+    a tile for each.
 
     Closing the browser, or losing its connection, holds the axes that it has set in
     motion. Ending this command stops the fingers only if they were moved from here.
@@ -65,8 +65,8 @@ async def web(
         password_file: File whose first line is the password, instead of the token.
         certificate: Your certificate in PEM, for https.
         key: Its private key in PEM.
-        speed: Speed of all axes from the first command on; the present one cannot be read.
-        force: Force of all axes from the first command on. A grip made with more loosens.
+        speed: Speed of all axes from the first command on; the present speed cannot be read.
+        force: Force of all axes from the first command on. A grip made with more force loosens.
     """
     need("nicegui", "web")
     from ...tools.web.server import PageServer

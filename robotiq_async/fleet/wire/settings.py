@@ -78,7 +78,7 @@ def settings_in(sent: SentRequest) -> dict[Setting, int]:
 
 
 def is_in(settings: Mapping[Setting, int], sent: SentRequest) -> bool:
-    """Whether a written image has all of it, for the axes that the gripper has."""
+    """Whether a written image has all of these settings, for the axes that the gripper has."""
     axes = dict(sent.request.by_axis)
     return all(
         axis not in axes or getattr(axes[axis], what) == value for (axis, what), value in settings.items()

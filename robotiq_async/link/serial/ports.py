@@ -25,8 +25,8 @@ _WHY: Final = {
     **dict.fromkeys((errno.ENOTTY, errno.EINVAL, errno.EISDIR), NO_PORT),
 }
 _ON_WINDOWS: Final = {"FileNotFoundError(": MISSING, "PermissionError(": TAKEN}
-"""There pyserial writes the system's error into its message, and gives no number. A port is opened for one
-program alone, and access is denied to the next."""
+"""On Windows pyserial writes the system's error into its message, and gives no number. A port is opened for
+one program alone, and the next program is denied access."""
 
 
 def why_no_port(error: OSError | None, folder: Path = BY_ID) -> str:

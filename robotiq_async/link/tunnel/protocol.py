@@ -17,7 +17,7 @@ from ..address import Address, entry_of
 
 @runtime_checkable
 class Tunnel(Protocol):
-    """A way to one gripper that carries Modbus requests. Pass such an object in place of an address.
+    """A way to one gripper that carries Modbus requests. Pass such an object instead of an address.
 
     One task makes all calls, one at a time. Blocking work belongs into a thread, and a call must not return
     before that has ended: ``await anyio.to_thread.run_sync(...)`` waits for it, also when it is cancelled.
@@ -60,7 +60,7 @@ class TunnelPlace:
 
     Attributes:
         host: name or IP address.
-        port: after the host; None if there is none.
+        port: after the host, or None.
         unit: unit id of the gripper, 1..247: ``device_id``, or the usual one.
         options: those after the question mark that are not for every gripper, as texts.
     """

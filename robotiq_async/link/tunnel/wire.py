@@ -3,7 +3,7 @@
 Each frame is one call of :meth:`Tunnel.exchange`, in a task that makes all calls. A call whose answer is no
 longer waited for is cancelled when the next request leaves, and that request waits for its end. So a tunnel
 never carries two requests at a time, and a request that it still keeps has left it before the next one does.
-A late reply is dropped, and a write without an answer stays in doubt until a status tells (dialogue.py).
+A late reply is dropped, and a write without an answer stays in doubt until a status decides (dialogue.py).
 """
 
 from __future__ import annotations

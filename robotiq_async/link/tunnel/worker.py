@@ -1,4 +1,4 @@
-"""Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
+"""Calls of foreign coroutines, made in a separate task so that they cannot block the caller."""
 
 from __future__ import annotations
 

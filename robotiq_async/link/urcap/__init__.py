@@ -1,1 +1,1 @@
-"""The text port of Robotiq's URCap on a UR controller: a link of its own beside Modbus."""
+"""The text port of Robotiq's URCap on a UR controller: another kind of link than Modbus."""

@@ -1,10 +1,10 @@
-"""The lines of the URCap's text port, and what they mean in registers. No I/O: bytes in, a verdict out.
+"""The lines of the URCap's text port, and their meaning in registers. No I/O: bytes in, a verdict out.
 
 Robotiq's URCap on a UR controller serves TCP port 63352. ``GET POS`` is answered by ``POS 12`` and an end of
-line, ``SET POS 255 GTO 1`` by ``ack`` without one. No document of the vendor's describes the port. Clients
-that ran on hardware show this: the example of ur_rtde, with GELLO's after it, airo-robots, and the URScript
-that the URCap adds to programs. The variables are the registers of a jaw by name, so what is read becomes the
-status registers that a serial line would carry. Some ports lack the variable of the motor current.
+line, ``SET POS 255 GTO 1`` by ``ack`` without an end of line. No document of the vendor describes the port.
+Clients that ran on hardware show this: the example of ur_rtde, with GELLO's after it, airo-robots, and the
+URScript that the URCap adds to programs. The variables are the registers of a jaw by name, so the values
+become the status registers that a serial line would carry. Some ports lack the variable of the motor current.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LINE_BYTES: Final = 16
 
 
 def question(name: str) -> bytes:
-    """The line that asks for a variable."""
+    """The line that requests a variable."""
     return f"GET {name}\n".encode()
 
 
@@ -75,7 +75,7 @@ def midway(before: Echo, after: Echo) -> Echo | None:
 
     Args:
         before: the echo of the image before.
-        after: that of the command: ACT, GTO and the position.
+        after: the echo of the command: ACT, GTO and the position.
     """
     (activation, go, position), (wanted, goes, target) = before, after
     if activation != wanted:
@@ -84,7 +84,7 @@ def midway(before: Echo, after: Echo) -> Echo | None:
 
 
 def choice(gripper: int) -> bytes:
-    """The line that says which of several grippers this connection is about."""
+    """The line that chooses one of several grippers for this connection."""
     return f"SET SID {gripper}\n".encode()
 
 
@@ -123,7 +123,7 @@ def is_acknowledged(received: bytes) -> bool:
 
 
 def without_ends(received: bytes) -> bytes:
-    """The rest without empty lines before it: an ``ack`` may have had an end of line after all."""
+    """The bytes without empty lines at their beginning: some ``ack`` may end with an end of line."""
     return received.lstrip(_LINE_END)
 
 

@@ -149,7 +149,7 @@ class Recovered:
 
 
 def read_recording(path: Path | str) -> Iterator[RecordedMessage]:
-    """Iterate over the messages of a recording. A truncated one ends with a warning.
+    """Iterate over the messages of a recording. A truncated recording ends with a warning.
 
     Raises:
         RecordingError: it cannot be read, is not an MCAP file, or does not have a recorder's format: a chunk
