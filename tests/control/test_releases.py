@@ -5,8 +5,11 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, State
+from robotiq_async.control.ledger import Ledger
+from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.request import Request
-from tests.control.scan import Scan
+from tests.control.scan import Scan, first_request
+from tests.register_words import status_of
 
 
 @pytest.fixture
@@ -175,3 +178,15 @@ def test_a_stop_leaves_the_activation_alone_by_which_another_client_has_ended_ou
     assert releasing.state is State.WF_ACTIVATION
     releasing.stop()
     assert releasing.status().activation_echo
+
+
+def test_a_release_lasts_while_its_fault_shows_whatever_gimc_says() -> None:
+    ledger, at = Ledger(first_request()), 1.0
+    ledger.update(status_of(0x31, fault=Fault.SCISSOR_BLOCKED), at)
+    ledger.adopt(status_of(0x31, fault=Fault.SCISSOR_BLOCKED))
+    ledger.write(Request(activate=True, release=True), NO_AXES, at, begins=True)
+    ledger.acknowledge(at)
+    ledger.update(status_of(0x31, fault=Fault.AUTOMATIC_RELEASE), at + 1)
+    assert ledger.begun is not None
+    ledger.update(status_of(0x31), at + 1.1)
+    assert ledger.begun is None
