@@ -174,8 +174,10 @@ def test_a_stop_leaves_the_activation_alone_by_which_another_client_has_ended_ou
     releasing: Scan,
 ) -> None:
     reset_and_activated_unseen(releasing, 1.0)
+    releasing.gripper.write(0, [0x0900])
     releasing.run(0.1)
     assert releasing.state is State.WF_ACTIVATION
+    assert releasing.latest.go_echo, "there is something to stop"
     releasing.stop()
     assert releasing.status().activation_echo
 

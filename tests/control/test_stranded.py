@@ -160,3 +160,12 @@ def test_a_hand_that_runs_finds_it_too(scan: Scan) -> None:
     assert scan.state is State.RESET
     scan.controller.activate()
     scan.until(lambda: scan.state is State.RUNNING_IDLE)
+
+
+def test_a_lost_link_begins_the_count_again() -> None:
+    """Behind it another client may just have raised rACT."""
+    evidence, shown = Evidence(), status_of(0x01)
+    for read in range(STRANDED_READS - 1):
+        assert evidence.update(shown, read * POLL_S) is None
+    evidence.lost()
+    assert evidence.update(shown, 2 * STRANDED_S) is None
