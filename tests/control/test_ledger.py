@@ -361,6 +361,16 @@ def test_settings_of_fingers_at_rest_are_not_remembered_for_ever() -> None:
     assert remembered(history) <= WINDOW_S * 200 + 2
 
 
+def test_a_status_of_another_image_is_not_taken_for_the_adopted_one() -> None:
+    ledger, adopted = Ledger(first_request()), status_of(0x39, 0xFF, echo=80, position=80)
+    ledger.update(adopted, 0.0)
+    ledger.adopt(adopted)
+    before = ledger.base
+    ledger.update(status_of(0x39, 0xFF, echo=90, position=90), 1.0)
+    assert ledger.match is None
+    assert ledger.base == before
+
+
 def test_an_adopted_image_may_differ_from_its_echo() -> None:
     """Simple control: B, C and the scissor echo 0 and have other requests."""
     ledger = Ledger(first_request(100, 50))
