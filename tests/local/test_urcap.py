@@ -27,7 +27,7 @@ from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.simulator.server.urcap_server import UrcapResponder
 from robotiq_async.simulator.troubles.corruption import unchanged
 from tests.grippers import activate_beforehand, until_moving
-from tests.virtual import until
+from tests.virtual import VirtualLoop, until
 
 pytestmark = pytest.mark.virtual_time
 
@@ -102,6 +102,17 @@ async def test_a_stream_of_commands_is_never_taken_for_those_of_another_client()
             await asyncio.sleep(0.008)
         await hand.halt()
         assert hand.statistics.foreign_commands == 0
+
+
+async def test_a_command_is_not_lost_because_the_loop_is_held_up_after_it() -> None:
+    """An answer from before the block, read after it, did not show the SET half a second later."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    async with at_a_ur() as (server, hand), server.fault_injector.making(Trouble("slow-device", 0.05)):
+        for turn in range(1, 16):
+            loop.after_turns(turn, lambda: loop.hold_up(0.6))
+            await hand.move(100 if turn % 2 else 50, speed=255)
+        assert hand.statistics.reconnects == 0
 
 
 # -- a command that the URCap takes one variable after the other ---------------------------------------------

@@ -293,7 +293,7 @@ class UrcapTransport:
                 break
         else:
             raise ProtocolError(f"{self._address}: ACT and GTO change too often to be read")
-        if self._shown == self._written or self._line.now() >= self._shows_by:
+        if self._shown == self._written or self._line.asked_at >= self._shows_by:
             self._written = NOTHING
         self._changes = self._written is not NOTHING
         return True
@@ -309,7 +309,8 @@ class UrcapTransport:
         Raises:
             ConnectionLostError: it does not show what was acknowledged, and nothing else either.
         """
-        shown, images, now = self._shown, (self._whole, *self._sent), self._line.now()
+        # By the time at which it was asked for: a loop that was held up reads an old answer late.
+        shown, images, now = self._shown, (self._whole, *self._sent), self._line.asked_at
         if shown not in images and now < self._shows_by:
             for before, after in pairwise(images):
                 if shown == lines.midway(before, after):
