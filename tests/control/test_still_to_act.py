@@ -7,7 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from robotiq_async import Fault, Finger, State
+from robotiq_async.values import registers as reg
 from robotiq_async.values.enums import Trigger
+from robotiq_async.values.status import RobotiqStatus
 from tests.control.scan import Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -110,6 +112,18 @@ def test_a_hand_moves_while_an_emergency_release_of_another_client_opens_the_fin
     scan.moved(200)
     scan.gripper.emergency_release()
     scan.until(lambda: scan.latest.fault is Fault.AUTOMATIC_RELEASE)
+    assert scan.controller.is_driven
+    assert scan.controller.is_moving
+
+
+def test_a_release_drives_the_fingers_whatever_gimc_shows(scan: Scan) -> None:
+    """That gIMC is 0 during a release is in the manual alone."""
+    scan.moved(200)
+    registers = list(scan.latest.registers)
+    reg.gFLT.write(registers, Fault.AUTOMATIC_RELEASE)
+    released = RobotiqStatus(tuple(registers), scan.now, scan.polls + 1)
+    assert released.is_activated
+    scan.controller.see(released, scan.now)
     assert scan.controller.is_driven
     assert scan.controller.is_moving
 
