@@ -124,7 +124,11 @@ def test_a_question_waits_longer_where_answers_have_just_taken_long() -> None:
     assert patience.seconds(left, 2.0) == pytest.approx(0.3), "by the response timeout"
     patience.note(left, SILENT, 0.0, 0.0)
     assert patience.seconds(left, 0.4) == 0.024
-    patience.note(right, b"", 1.0, 1.04)
+    patience.note(right, b"", 1.0, 3.0)
+    patience.note(right, b"", 3.0, 3.003)
+    assert patience.seconds(left, 0.4) == 0.024, "the loop was held up, and the line is as fast as before"
+    for _ in range(2):
+        patience.note(right, b"", 4.0, 4.04)
     assert patience.seconds(left, 0.4) == patience.seconds(right, 0.4) == pytest.approx(0.16)
     assert patience.seconds(left, 0.1) == 0.1, "never beyond the response timeout"
     for _ in range(100):

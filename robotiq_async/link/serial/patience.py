@@ -57,8 +57,10 @@ class LinePatience:
 
     def __init__(self) -> None:
         self._silent: Final[WeakKeyDictionary[object, _SilentUser]] = WeakKeyDictionary()
+        self._took: Final = WeakKeyDictionary[object, float]()
+        """The seconds that the last answer of each user took."""
         self._slowest = 0.0
-        """The slowest answer of late, in seconds."""
+        """The slowest answer of late, in seconds. One alone is none: the loop may have been held up."""
 
     def seconds(self, user: object, response_s: float) -> float:
         """The longest time for the next answer; ``response_s`` is the response timeout."""
@@ -75,7 +77,8 @@ class LinePatience:
             rest = 0.0 if misses == 1 else TURN_SOON_S if misses <= SOON else LINE_REST_S
             self._silent[user] = _SilentUser(misses, now + rest)
         elif isinstance(answer, bytes):
-            self._slowest = max(now - asked, FADES * self._slowest)
+            before, self._took[user] = self._took.get(user, 0.0), now - asked
+            self._slowest = max(min(before, now - asked), FADES * self._slowest)
             self._silent.pop(user, None)
 
     def until(self, user: object) -> float:
