@@ -1,7 +1,7 @@
 """A third kind of hand, one page long: no link, no task, no simulator. All happens at once.
 
-It proves that a hand takes no more than Hand requires of its subclasses, and that the parts around a hand
-needs nothing but a Hand.
+It proves that a hand needs no more than a Backend supplies, and that the parts around a hand
+need nothing but a Hand.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from robotiq_async import (
     Trigger,
 )
 from robotiq_async.calibration import Units
-from robotiq_async.hands import Hand
+from robotiq_async.hands import Backend, Hand
 from robotiq_async.values import registers as reg
 from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 
 
-class FakeHand(Hand):
+class FakeBackend(Backend):
     """An active gripper whose axes are where they are sent as soon as they are sent there."""
 
     def __init__(self, name: str = "") -> None:
@@ -51,33 +51,33 @@ class FakeHand(Hand):
         self._fault = fault
         self._enter(State.FAULT, Trigger.SEEN_FAULT)
 
-    async def _start(self, activate: bool, wait: float) -> None:
+    async def start(self, activate: bool, wait: float) -> None:
         self._enter(State.RUNNING_IDLE, Trigger.SEEN_READY)
 
-    async def _stop(self, halt: bool, keep_grip: bool) -> None:
+    async def stop(self, halt: bool, keep_grip: bool) -> None:
         if halt and not keep_grip and self.state is not State.SHUTDOWN:
             self._write(go=False)
         self._enter(State.SHUTDOWN, Trigger.STOPPED)
-        self._channels.end()
+        self.channels.end()
 
-    async def _set(self, what: str, value: int, axes: Finger) -> None:
+    async def set(self, what: str, value: int, axes: Finger) -> None:
         self._apply(axes, {what: value})
 
-    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
+    def command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
         self._apply(axes, {"position": position, "speed": speed, "force": force})
 
     def _apply(self, axes: Finger, changes: dict[str, int | None]) -> None:
-        self._check_running()
+        self.check_running()
         wanted: dict[str, Any] = {name: value for name, value in changes.items() if value is not None}
         each = zip(THREE_FINGER.axes, self._request.axes, strict=True)
         self._enter(State.RUNNING_CC, Trigger.ASK_COMMAND)
         self._write(axes=tuple(replace(old, **wanted) if axis & axes else old for axis, old in each))
         self._enter(State.RUNNING_IDLE, Trigger.DELIVERED)
 
-    async def _move(
+    async def move(
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
     ) -> MoveResult:
-        self._command(axes, target, speed, force)
+        self.command(axes, target, speed, force)
         status = self.status
         return MoveResult(
             outcomes={axis: status.finger_status(axis) for axis in axes},
@@ -89,17 +89,17 @@ class FakeHand(Hand):
             status=status,
         )
 
-    async def _hold(self, axes: Finger) -> None:
-        self._check_running()
+    async def hold(self, axes: Finger) -> None:
+        self.check_running()
 
-    async def _halt(self) -> None:
+    async def halt(self) -> None:
         self._write(go=False)
 
-    async def _inhibit(self, inhibit: Inhibit) -> None:
+    async def inhibit(self, inhibit: Inhibit) -> None:
         self._inhibited = inhibit if self._inhibited is None else self._inhibited.again()
-        await self._halt()
+        await self.halt()
 
-    async def _permit(self, who: str, seen: Inhibit | None) -> None:
+    async def permit(self, who: str, seen: Inhibit | None) -> None:
         if seen in (None, self._inhibited):
             self._inhibited = None
 
@@ -107,22 +107,22 @@ class FakeHand(Hand):
     def inhibited(self) -> Inhibit | None:
         return self._inhibited
 
-    async def _activate(self) -> None:
+    async def activate(self) -> None:
         self._write(activate=True, go=False)
         self._enter(State.RUNNING_IDLE, Trigger.SEEN_READY)
 
-    async def _reset(self) -> None:
+    async def reset(self) -> None:
         self._fault = Fault.NONE
         self._write(activate=False, go=False)
         self._enter(State.RESET, Trigger.SEEN_RESET)
 
-    async def _atr(self) -> None:
+    async def atr(self) -> None:
         if self.state is not State.FAULT:
             raise InvalidStateError("there is no fault", self.state, {State.FAULT})
         self._write(release=True)
         self._enter(State.ATR_DONE, Trigger.SEEN_RELEASED)
 
-    async def _recover(self, timeout: float | None) -> None:
+    async def recover(self, timeout: float | None) -> None:
         await self.reset()
         await self.activate()
 
@@ -136,27 +136,27 @@ class FakeHand(Hand):
         return Statistics(polls, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, "at once", 0, {"reached": polls})
 
     @property
-    def _newest_status(self) -> RobotiqStatus | None:
+    def newest_status(self) -> RobotiqStatus | None:
         return self._last
 
-    def _is_moving(self) -> bool:
+    def is_moving(self) -> bool:
         return False
 
-    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
+    async def wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
         raise StateTimeoutError("nothing happens later here")
 
-    def _check_running(self) -> None:
+    def check_running(self) -> None:
         if self.state in (State.DISCONNECTED, State.SHUTDOWN):
             raise NotStartedError("the fake hand does not run")
 
     def _write(self, **changes: Any) -> None:
         self._request = replace(self._request, **{"go": True, **changes})
-        self._channels.requests.push(SentRequest(self._request, _now(), acknowledged=True))
+        self.channels.requests.push(SentRequest(self._request, _now(), acknowledged=True))
         self._read()
 
     def _enter(self, state: State, trigger: Trigger) -> None:
         source, self._state = self._state, state
-        self._channels.transitions.push(Transition(source, state, trigger, _now()))
+        self.channels.transitions.push(Transition(source, state, trigger, _now()))
         self._read()
 
     def _read(self) -> None:
@@ -173,7 +173,19 @@ class FakeHand(Hand):
             reg.gPO[n].write(block, self.obstacle if met else min(max(axis.position, 6), 241))
         sequence = 0 if self._last is None else self._last.sequence + 1
         self._last = RobotiqStatus.from_registers(block, timestamp=_now(), sequence=sequence)
-        self._channels.statuses.push(self._last)
+        self.channels.statuses.push(self._last)
+
+
+class FakeHand(Hand):
+    """A hand without a link.
+
+    Attributes:
+        fake: its backend.
+    """
+
+    def __init__(self, name: str = "", kind: type[FakeBackend] = FakeBackend) -> None:
+        self.fake = kind(name)
+        super().__init__(self.fake)
 
 
 def _now() -> float:

@@ -25,7 +25,7 @@ MOVING = status_of(0x39, 0x00)
 
 def hand_with(status: RobotiqStatus) -> FakeHand:
     hand = FakeHand()
-    hand._state, hand._last = State.RUNNING_IDLE, status
+    hand.fake._state, hand.fake._last = State.RUNNING_IDLE, status
     return hand
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from abc import abstractmethod
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from ..calibration import Units
@@ -12,7 +10,6 @@ from ..calibration.amounts import LABELS, OPENINGS, RATES, force_of, needed, pos
 from ..runtime.concurrency import running_loop
 from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout, repr_of
 from ..values.enums import CLOSED, OPEN, Finger, State
-from ..values.errors import NotStartedError
 from ..values.events import SentRequest, Transition
 from ..values.grip import GraspResult, GripEvent, check_at_least
 from ..values.inhibit import Inhibit
@@ -20,16 +17,16 @@ from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.status import Part, RobotiqStatus
 from .arguments import describes_arguments
+from .backend import Backend
 from .grip_watch import SLIP_COUNTS, GripWatch
-from .kind import HandKind
 from .options import LONGEST_WAIT_S
-from .present_run import refuse_with
+from .present_run import NamesErrors, refuse_copy, refuse_with
 from .statistics import Statistics
 from .streams import Stream, check_buffer, check_limit
 from .waiting import check_states
 
 
-class Hand(HandKind):
+class Hand:
     """One gripper, with the calls that every hand has.
 
     Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop
@@ -50,19 +47,19 @@ class Hand(HandKind):
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
-    To add a kind of hand, supply the abstract methods, give ``_channels`` each status and transition, and set
-    ``_session`` to the present :class:`~robotiq_async.hands.present_run.PresentRun`, or override
-    ``_check_running``.
-
     Args:
-        address: of the gripper; no two hands of a process have the same one.
-        name: of the hand in the log, errors and metrics; empty for its address.
-        units: converts positions, speeds and forces of the model; by default by these calibrations.
-        keep_grip: whether :meth:`stop` keeps a grip by default.
-        model: of the gripper; None for the model of a calibration, else a 3-Finger.
-        calibration: the speeds of the gripper; None for the thesis's gripper.
-        force_calibration: the forces of the gripper; None for the manual's figures.
+        backend: reaches the gripper; each kind of hand has its own.
     """
+
+    def __init__(self, backend: Backend) -> None:
+        self._backend = backend
+        self._naming = NamesErrors(backend.name)
+
+    def __repr__(self) -> str:
+        name = f"{self._backend.name} " if self._backend.name else ""
+        return f"<{type(self).__name__} {name}{self.address} {self.state.name}>"
+
+    __reduce__ = refuse_copy
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -70,9 +67,7 @@ class Hand(HandKind):
         await self.start()
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await self.stop()
 
     if not TYPE_CHECKING:  # type checkers report the mistake themselves
@@ -105,8 +100,8 @@ class Hand(HandKind):
         check_flag("activate", activate)
         wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
         with self._naming:
-            self._check_may_start(running_loop())
-            await self._start(activate, wait)
+            self._backend.check_may_start(running_loop())
+            await self._backend.start(activate, wait)
 
     @describes_arguments()
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
@@ -135,8 +130,7 @@ class Hand(HandKind):
         then.
         """
         check_flag("halt", halt)
-        keeps = self._keeps_grip(keep_grip)
-        await self._stop(halt, keeps)
+        await self._backend.stop(halt, self._backend.keeps_grip(keep_grip))
 
     # -- commands --------------------------------------------------------------------------------------
 
@@ -160,7 +154,7 @@ class Hand(HandKind):
         axes = self.model.mask(fingers)
         target = position_of(self.units, axes, value, mm, open_fraction, "value")
         with self._naming:
-            await self._set("position", needed("set_position", target, "value", *OPENINGS), axes)
+            await self._backend.set("position", needed("set_position", target, "value", *OPENINGS), axes)
 
     @describes_arguments(value="new_speed")
     async def set_speed(
@@ -174,7 +168,7 @@ class Hand(HandKind):
         axes = self.model.mask(fingers)
         speed = speed_of(self.units, value, mm_per_s, "value")
         with self._naming:
-            await self._set("speed", needed("set_speed", speed, "value", *RATES), axes)
+            await self._backend.set("speed", needed("set_speed", speed, "value", *RATES), axes)
 
     @describes_arguments(value="new_force")
     async def set_force(
@@ -188,7 +182,7 @@ class Hand(HandKind):
         axes = self.model.mask(fingers)
         force = force_of(self.units, value, label_n, "value")
         with self._naming:
-            await self._set("force", needed("set_force", force, "value", *LABELS), axes)
+            await self._backend.set("force", needed("set_force", force, "value", *LABELS), axes)
 
     @describes_arguments()
     def command(
@@ -227,7 +221,7 @@ class Hand(HandKind):
             position = position_of(units, axes, position, mm, open_fraction)
             speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
         with self._naming:
-            self._command(axes, position, speed, force)
+            self._backend.command(axes, position, speed, force)
 
     @describes_arguments()
     async def move(
@@ -260,12 +254,11 @@ class Hand(HandKind):
         """
         axes = self.model.mask(fingers)
         units = self.units
-        target = position_of(units, axes, position, mm, open_fraction)
-        target = needed("move", target, "position", *OPENINGS)
+        target = needed("move", position_of(units, axes, position, mm, open_fraction), "position", *OPENINGS)
         speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
         limit = check_timeout("timeout", timeout)
         with self._naming:
-            return await self._move(axes, target, speed, force, limit)
+            return await self._backend.move(axes, target, speed, force, limit)
 
     @describes_arguments()
     async def open(
@@ -347,7 +340,7 @@ class Hand(HandKind):
         """
         axes = self.model.mask(fingers)
         with self._naming:
-            await self._hold(axes)
+            await self._backend.hold(axes)
 
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0). The next command sets rGTO again, and moves only the axes it names.
@@ -368,7 +361,7 @@ class Hand(HandKind):
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
         with self._naming:
-            await self._halt()
+            await self._backend.halt()
 
     @describes_arguments(who="whose")
     async def inhibit(self, reason: str, *, who: str = "") -> None:
@@ -389,7 +382,7 @@ class Hand(HandKind):
             RobotiqError: as :meth:`halt`: the fingers MAY STILL MOVE.
         """
         with self._naming:
-            await self._inhibit(Inhibit(reason, who, time.time()))
+            await self._backend.inhibit(Inhibit(reason, who, time.time()))
 
     @describes_arguments(who="whose")
     async def permit(self, *, who: str = "", seen: Inhibit | None = None) -> None:
@@ -404,7 +397,7 @@ class Hand(HandKind):
         if not isinstance(seen, Inhibit | None):
             raise TypeError(f"seen must be an Inhibit or None, got {repr_of(seen)}")
         with self._naming:
-            await self._permit(who, seen)
+            await self._backend.permit(who, seen)
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -421,7 +414,7 @@ class Hand(HandKind):
             RobotiqError: not possible now, or the link went down.
         """
         with self._naming:
-            await self._activate()
+            await self._backend.activate()
 
     async def reset(self) -> None:
         """Reset the gripper (rACT = 0): this clears faults and lets go of the part. Returns in RESET.
@@ -434,7 +427,7 @@ class Hand(HandKind):
             RobotiqError: not possible now, or the link went down.
         """
         with self._naming:
-            await self._reset()
+            await self._backend.reset()
 
     async def atr(self) -> None:
         """Release automatically: all axes open slowly, in any fault. Only in FAULT.
@@ -449,7 +442,7 @@ class Hand(HandKind):
             RobotiqError: the link went down.
         """
         with self._naming:
-            await self._atr()
+            await self._backend.atr()
 
     @describes_arguments(timeout="recovery")
     async def recover(self, timeout: float | None = None) -> None:
@@ -469,38 +462,49 @@ class Hand(HandKind):
         """
         limit = check_timeout("timeout", timeout)
         with self._naming:
-            await self._recover(limit)
+            await self._backend.recover(limit)
 
     # -- reading ---------------------------------------------------------------------------------------
 
     @property
+    def state(self) -> State:
+        """The state of the hand."""
+        return self._backend.state
+
+    @property
+    def inhibited(self) -> Inhibit | None:
+        """The reason that motion is refused, since when, and by whom; None while it is permitted."""
+        return self._backend.inhibited
+
+    @property
     def name(self) -> str:
         """The hand's name in the log, errors and metrics: the one it was given, or else its address."""
-        return self._given_name or self._address
+        return self._backend.name or self._backend.address
 
     @property
     def address(self) -> str:
         """The gripper's address in its full form; for a tunnel object, its name in messages."""
-        return self._address
+        return self._backend.address
 
     @property
     def model(self) -> Model:
         """The model of the gripper. A remote hand knows it once it is started."""
-        newest = self._newest_status
-        return self._model if newest is None else newest.model
+        return self._backend.model
 
     @property
     def units(self) -> Units:
         """Converts mm, mm/s, seconds and newton labels to values and back, by the hand's calibrations."""
-        return self._units(self.model)
+        return self._backend.units
 
     @property
     def status(self) -> RobotiqStatus:
         """The newest status, of any age (see its timestamp); NotStartedError before the first."""
-        if (status := self._newest_status) is not None:
-            return status
         with self._naming:
-            raise NotStartedError("no status has been read yet: start the hand first")
+            return self._backend.status
+
+    def _current_status(self) -> RobotiqStatus:
+        with self._naming:
+            return self._backend.current_status()
 
     @property
     def part(self) -> Part | None:
@@ -527,12 +531,12 @@ class Hand(HandKind):
         Raises RobotiqError while that is not known: before the start, and when the link is down.
         """
         self._current_status()
-        return self._is_moving()
+        return self._backend.is_moving()
 
     @property
-    @abstractmethod
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
+        return self._backend.statistics
 
     @describes_arguments()
     def statuses(self, buffer: int = 1, *, lost_after: float | None = None) -> Stream[RobotiqStatus]:
@@ -546,17 +550,17 @@ class Hand(HandKind):
         that time. It may be read on, unless the hand has given up: then it is in SHUTDOWN.
         """
         kept, limit = check_buffer(buffer), check_limit("lost_after", lost_after)
-        return self._opened(self._channels.statuses, kept, limit)
+        return self._backend.open_stream(self._backend.channels.statuses, kept, limit)
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, none lost, for one reader. Ends as :meth:`statuses` does."""
-        return self._opened(self._channels.transitions, None)
+        return self._backend.open_stream(self._backend.channels.transitions, None)
 
     @describes_arguments(buffer="requests")
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, as :meth:`statuses`; a ``buffer`` of None loses none."""
         kept = None if buffer is None else check_buffer(buffer)
-        return self._opened(self._channels.requests, kept)
+        return self._backend.open_stream(self._backend.channels.requests, kept)
 
     @describes_arguments(fingers="watched")
     def grip_events(
@@ -573,10 +577,10 @@ class Hand(HandKind):
         is noticed once its finger closes further; the manual says, only when the force is raised.
         """
         watch = GripWatch(self.model.mask(fingers), since=since, slip=slip)
-        self._check_may_listen()
-        if since is None and self._newest_status is not None:
-            watch.see(self._newest_status)
-        return self._channels.statuses.derive(watch.see)
+        self._backend.check_may_listen()
+        if since is None and self._backend.newest_status is not None:
+            watch.see(self._backend.newest_status)
+        return self._backend.channels.statuses.derive(watch.see)
 
     @describes_arguments(timeout="waiting")
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
@@ -592,5 +596,5 @@ class Hand(HandKind):
         if self.state in states:
             return self.state
         with self._naming:
-            self._check_running()
-            return await self._wait_for_state(states, limit)
+            self._backend.check_running()
+            return await self._backend.wait_for_state(states, limit)

@@ -104,7 +104,7 @@ class Caller:
 
         If it has only read, an interruption and the end of the program write nothing, either.
         """
-        return self.hand._has_commanded  # noqa: SLF001  # both are the hand
+        return self.hand._local.has_commanded  # noqa: SLF001  # both are the hand
 
     def _warn_of_a_running_loop(self) -> None:
         """Warn once that each call blocks a loop that runs in this thread, and everything in that loop."""
@@ -129,7 +129,7 @@ class Caller:
     @property
     def is_running(self) -> bool:
         """Whether the hand was started, and has neither been stopped nor given up on its link."""
-        session = self.hand._session  # noqa: SLF001  # both are the hand
+        session = self.hand._local.session  # noqa: SLF001  # both are the hand
         return not (self._is_left_behind or session is None or session.is_over)
 
     @property

@@ -83,7 +83,7 @@ async def hand(seconds: float, ports: list[int], count: int = 1) -> Figures:
     async with RobotiqHand(f"127.0.0.1:{ports[0]}") as it:
         readers = [asyncio.create_task(read(it)) for _ in range(count)]
         await asyncio.sleep(SETTLE_S)
-        session = it._session
+        session = it._local.session
         assert session is not None
         counters = session.counters  # every single period: the public figures are of the last few seconds
         counters.periods.clear()
@@ -112,8 +112,9 @@ async def latency(seconds: float, ports: list[int]) -> Figures:
     Commands follow each other closely here; what the distance between two writes adds is not measured.
     """
     it = RobotiqHand(f"127.0.0.1:{ports[0]}", write_spacing=0.0)
-    link: Any = it._options.make_transport()
-    it._options = replace(it._options, link=replace(it._options.link, make=lambda **_: link))
+    link: Any = it.options.make_transport()
+    given = replace(it.options, link=replace(it.options.link, make=lambda **_: link))
+    it._local.options = given  # type: ignore[misc]  # once, to get at the link
     arrived = written = 0.0
     connection = link._connection
     hear, ask = connection._on_data, link._ask

@@ -135,7 +135,7 @@ async def measured_polls(hands: dict[str, RobotiqHand]) -> None:
 
 def periods_of(hand: RobotiqHand) -> deque[float]:
     """Every single one: the public figures are of the last few seconds, the start included."""
-    session = hand._session
+    session = hand._local.session
     assert session is not None
     return session.counters.periods
 
@@ -171,7 +171,7 @@ async def watched(bus: ZenohBus, names: list[GripperName]) -> AsyncIterator[list
 async def read(hand: RemoteHand, late: list[float]) -> None:
     """The delay of statuses at their reader: the agent's clock is ours, for it is on this machine."""
     async for _ in hand.statuses():
-        session = hand._session
+        session = hand._remote.session
         assert session is not None
         late.append(time.monotonic() - session.mirror.stamp)
 

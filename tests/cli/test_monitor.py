@@ -182,7 +182,7 @@ async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: O
         peaks = [strong.current_ma(axis) or 0 for axis in THREE_FINGER.axes]
         assert max(peaks) == 90
         for status in (strong, active.hand.status):
-            active.hand._channels.statuses.push(status)
+            active.hand._backend.channels.statuses.push(status)
         pilot.app._look()
         assert "   90 mA" in pilot.app.query_one(Axes).render().plain
 

@@ -159,7 +159,7 @@ async def compare(endpoint: str) -> None:
             await hand.stop()
         for task in tasks:
             task.cancel()
-    misrouted = sum(hand._session.mirror.misrouted for hand in hands.values() if hand._session)
+    misrouted = sum(hand._remote.session.mirror.misrouted for hand in hands.values() if hand._remote.session)
     await bus.close()
     say(json.dumps({"heard": heard, "wrong": wrong, "commanded": commanded, "misrouted": misrouted}))
 

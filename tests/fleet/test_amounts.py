@@ -24,10 +24,10 @@ POINTS = ((13, 100.0), (213, 2.0))
 async def test_the_points_of_the_agents_hand_are_those_of_the_client() -> None:
     async with lab(model=TWO_FINGER_85, stroke=POINTS) as here, here.client("client") as hand:
         assert hand.units.stroke == here.local.units.stroke
-        assert hand._session is not None
-        hand._session.mirror.points = ()
+        assert hand._remote.session is not None
+        hand._remote.session.mirror.points = ()
         limit = Limit(1.0)
-        assert await hand._session._ask_info(limit), "an answer tells them, without a summary"
+        assert await hand._remote.session._ask_info(limit), "an answer tells them, without a summary"
         limit.stop()
         assert hand.units.stroke == here.local.units.stroke
         result = await hand.move(mm=40)
@@ -52,7 +52,7 @@ async def test_an_agent_takes_requests_in_counts_alone() -> None:
         writes = len(here.gripper.writes)
         for name, arguments in requests:
             with pytest.raises(TypeError, match="requests are in counts, got"):
-                await hand._ask(name, **arguments)
+                await hand._remote._ask(name, **arguments)
         assert len(here.gripper.writes) == writes
 
 

@@ -142,8 +142,8 @@ async def test_a_forked_process_is_another_client(here: Lab, monkeypatch: pytest
 async def test_a_late_request_of_the_last_run_does_nothing_in_the_next(
     here: Lab, hand: RemoteHand, verb: str, arguments: dict[str, Any]
 ) -> None:
-    assert hand._session is not None
-    late = hand._session.dialog.call(arguments)
+    assert hand._remote.session is not None
+    late = hand._remote.session.dialog.call(arguments)
     await hand.stop()
     await hand.start()
     lease = here.lease

@@ -81,7 +81,7 @@ async def test_nothing_malformed_keeps_it_from_halting(here: Lab) -> None:
     """Whatever a program of others calls the reason, the fingers stop, and stay."""
     async with here.client("holder") as hand:
         await here.moving(hand)
-        dialog = hand._session.dialog  # type: ignore[union-attr]
+        dialog = hand._remote.session.dialog  # type: ignore[union-attr]
         await dialog.halt(arguments={"inhibit": ["\x1b[2J" * 400], "who": 7})
         assert not here.gripper.is_moving
         inhibit = here.local.inhibited
@@ -128,7 +128,7 @@ async def test_a_permit_lifts_the_inhibit_that_its_person_saw_and_no_later_one(h
         assert here.local.inhibited is not None
         for named in ({}, {"inhibited": 3}, {"inhibited": {"reason": "", "who": "", "since": 1}}):
             with pytest.raises(RobotiqStateError, match="look at the gripper"):
-                await other._session.dialog.ask("lease", {"what": "permit", **named}, timeout=1)  # type: ignore[union-attr]
+                await other._remote.session.dialog.ask("lease", {"what": "permit", **named}, timeout=1)  # type: ignore[union-attr]
         await other.permit()
         assert here.local.inhibited is None
 

@@ -27,8 +27,8 @@ A, B = Finger.A, Finger.B
 
 
 def call_of(hand: RemoteHand, **arguments: object) -> AgentCall:
-    assert hand._session is not None
-    return hand._session.dialog.call(arguments)
+    assert hand._remote.session is not None
+    return hand._remote.session.dialog.call(arguments)
 
 
 def force_of_a(here: Lab) -> int:

@@ -64,10 +64,10 @@ def records(tmp_path: Path, disk: Disk) -> Records:  # lies below it
 
 def force_of(folder: Path, client: RemoteHand) -> object:
     """The force of finger A that the next agent would know of a client."""
-    assert client._session is not None
+    assert client._remote.session is not None
     record = Records(folder).read(LEFT)
     kept = {} if record is None else record["settings"]["clients"]
-    return kept.get(client._session.dialog.client, {}).get("1", {}).get("force")
+    return kept.get(client._remote.session.dialog.client, {}).get("1", {}).get("force")
 
 
 async def written(records: Records) -> None:

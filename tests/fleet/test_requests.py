@@ -301,7 +301,7 @@ async def test_no_call_is_open_for_longer_than_it_says(here: Lab, what: str) -> 
 async def test_a_request_waits_for_the_one_that_was_asked_before_it(here: World) -> None:
     client = here.other
     await client.do(client.hand.take())
-    session = client.hand._session
+    session = client.hand._remote.session
     assert session is not None
     made = session.dialog.call({"position": 50, "fingers": 1})
 

@@ -128,8 +128,8 @@ async def test_a_copy_of_the_request_for_the_lease_forgets_no_setting_on_its_way
     here: Lab, reader: RemoteHand
 ) -> None:
     """The force was acknowledged, and the next time the hand's own was written in its place."""
-    assert reader._session is not None
-    dialog = reader._session.dialog
+    assert reader._remote.session is not None
+    dialog = reader._remote.session.dialog
     take = dialog.call({"what": "take", "label": "twice"})
     lease = (await here.answer("lease", take.pack())).value["lease"]
     force = replace(dialog.call({"value": 200, "fingers": 1}), lease=lease)
@@ -354,9 +354,9 @@ def test_malformed_settings_are_refused(fields: object) -> None:
 
 @inside(lab)
 async def test_a_lease_with_settings_that_are_none_is_refused(here: Lab, reader: RemoteHand) -> None:
-    assert reader._session is not None
+    assert reader._remote.session is not None
     await reader.acquire()
-    call = reader._session.dialog.call({"what": "settings", "settings": {"1": {"speed": 999}}})
+    call = reader._remote.session.dialog.call({"what": "settings", "settings": {"1": {"speed": 999}}})
     with pytest.raises(ValueError, match="speed"):
         (await here.answer("lease", call.pack())).outcome(RobotiqStatus.from_raw)
 

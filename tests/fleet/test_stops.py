@@ -269,7 +269,7 @@ class Asked(Query):
 
 
 def every_motion(hand: RemoteHand) -> Iterator[Asked]:
-    session = hand._session
+    session = hand._remote.session
     assert session is not None
     for name, arguments in (
         ("move", {"position": 250}),

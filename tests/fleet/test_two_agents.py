@@ -246,7 +246,7 @@ async def test_another_agent_that_comes_and_goes_does_not_fill_log_and_events(
             here.agent._report_conflict(key, is_there=False)
         assert here.agent.hands["left"].publisher._count == events + 1
         for number in range(500):
-            client_agents = client._session.keeper  # type: ignore[union-attr]
+            client_agents = client._remote.session.keeper  # type: ignore[union-attr]
             client_agents._update_token(f"{key}{number}", is_there=True)
             client_agents._update_token(f"{key}{number}", is_there=False)
     assert len(caplog.records) <= 2

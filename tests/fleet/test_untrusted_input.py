@@ -54,9 +54,9 @@ OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, F
 @inside(lab)
 @pytest.mark.parametrize(("verb", "arguments"), STRANGE)
 async def test_from_the_holder_of_the_lease(here: Lab, hand: RemoteHand, verb: str, arguments: Any) -> None:
-    assert hand._session is not None
+    assert hand._remote.session is not None
     writes = len(here.gripper.writes)
-    call = hand._session.dialog.call(arguments)
+    call = hand._remote.session.dialog.call(arguments)
     answer = await here.answer(verb, call.pack())
     assert answer.number == call.number
     with pytest.raises((RobotiqError, TypeError, ValueError)):
@@ -95,10 +95,10 @@ async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing(
     here: Lab, hand: RemoteHand, second: dict[str, int]
 ) -> None:
     """The first axis moved, and the answer said that nothing was done."""
-    assert hand._session is not None
+    assert hand._remote.session is not None
     axes = {"1": {"position": 90}, "2": second}
     with pytest.raises((TypeError, ValueError)):
-        await hand._session.dialog.ask("cmd/command", {"axes": axes}, timeout=1.0)
+        await hand._remote.session.dialog.ask("cmd/command", {"axes": axes}, timeout=1.0)
     await asyncio.sleep(1)
     assert here.gripper.position(Finger.A) < 10
 
@@ -127,12 +127,12 @@ async def test_a_command_without_its_argument_is_refused_before_it_is_a_job(
 @inside(lab)
 async def test_arguments_that_do_not_fit_leave_nothing_behind(here: Lab, hand: RemoteHand) -> None:
     """The axes counted as commanded, and what others had set going was held at the end of the lease."""
-    assert hand._session is not None
+    assert hand._remote.session is not None
     await here.local.set_speed(0)
     await here.local.set_position(250, Finger.B)
     for arguments in ({"position": 9, "fingers": 2, "more": 1}, {"position": 9, "fingers": INFINITE}):
         with pytest.raises((TypeError, ValueError, OverflowError, AgentError)):
-            await hand._session.dialog.ask("cmd/move", arguments, timeout=1.0)
+            await hand._remote.session.dialog.ask("cmd/move", arguments, timeout=1.0)
     async with here.client("other", control=False) as other:
         await other.take()
         await asyncio.sleep(0.2)
@@ -167,8 +167,8 @@ async def test_a_client_whose_name_is_no_plain_text_gets_no_lease(
     here: Lab, reader: RemoteHand, name: str
 ) -> None:
     """With half a character as its name, requests of all others went unanswered until its lease ended."""
-    assert reader._session is not None
-    seen = reader._session.mirror.stamp
+    assert reader._remote.session is not None
+    seen = reader._remote.session.mirror.stamp
     acquire = {"what": "acquire", "label": "eve"}
     call = AgentCall(LEFT.base, name, number=1, seen=seen, arguments=acquire)
     with pytest.raises(ProtocolError, match="not a request"):
@@ -184,12 +184,12 @@ async def test_a_client_whose_name_is_no_plain_text_gets_no_lease(
 async def test_labels_of_clients_are_made_printable(
     here: Lab, reader: RemoteHand, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert reader._session is not None
-    seen = reader._session.mirror.stamp
+    assert reader._remote.session is not None
+    seen = reader._remote.session.mirror.stamp
     for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
         call = AgentCall(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
         (await here.answer(verb, call.pack())).outcome(RobotiqStatus.from_raw)
-    info = await reader._session.dialog.ask("info", timeout=1.0)
+    info = await reader._remote.session.dialog.ask("info", timeout=1.0)
     assert info["holder"].isprintable(), "who shows it elsewhere may not look at it first"
     with pytest.raises(ControlLostError) as refused:
         await reader.acquire()

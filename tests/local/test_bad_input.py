@@ -47,7 +47,7 @@ def test_reserved_unit_ids_on_a_serial_line(address: str, unit: int) -> None:
 
 def test_intervals_and_time_outs_of_a_line_and_of_a_network() -> None:
     def figures(address: str, **given: Any) -> tuple[float, float]:
-        options = RobotiqHand(address, **given)._options
+        options = RobotiqHand(address, **given).options
         transport: Any = options.make_transport()
         return options.poll_interval, transport.dialogues._usual.seconds
 
@@ -61,7 +61,7 @@ def test_intervals_and_time_outs_of_a_line_and_of_a_network() -> None:
 @pytest.mark.parametrize("address", ["tcp://192.168.1.11", "rtu:///dev/ttyUSB0"])
 def test_a_jaw_takes_writes_twice_as_often(address: str) -> None:
     def spacing(model: str, **given: Any) -> float:
-        return RobotiqHand(address, model=model, **given)._options.write_spacing
+        return RobotiqHand(address, model=model, **given).options.write_spacing
 
     assert spacing("3f") == 0.01
     assert spacing("2f85") == spacing("hand-e") == 0.005
@@ -93,7 +93,7 @@ def test_options_that_are_numbers_of_numpy() -> None:
         request_address=byte,
         status_address=byte,
     )
-    options = hand._options
+    options = hand.options
     policy = options.policy
     assert policy is not None
     assert policy == ReconnectPolicy(first_delay=0.25, max_delay=3.0, give_up_after=3.0)

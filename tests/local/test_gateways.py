@@ -128,7 +128,7 @@ async def test_a_refused_read_names_the_option(gateway: SimulatorServer) -> None
 async def test_the_socket_is_kept_alive(gateway: SimulatorServer) -> None:
     async with RobotiqHand(gateway.address) as hand:
         await asyncio.sleep(0)
-        session = hand._session
+        session = hand._local.session
         assert session is not None
         wire = session.run._parts.link.dialogues.line._wire  # type: ignore[attr-defined]
         line: socket.socket = wire._client.ctx.transport.get_extra_info("socket")

@@ -35,7 +35,7 @@ from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.fake_hand import FakeHand
+from tests.fake_hand import FakeBackend, FakeHand
 from tests.fleet.lab import lab
 from tests.grippers import activate_beforehand, lose_link, shows
 from tests.virtual import LATENCY_S
@@ -415,10 +415,10 @@ async def test_without_a_link_nothing_is_known(
     assert "fault" not in json.loads(status_text(fresh, takes_commands=False))
 
 
-class Disobedient(FakeHand):
+class Disobedient(FakeBackend):
     """A gripper that does not show a halt."""
 
-    async def _halt(self) -> None:
+    async def halt(self) -> None:
         raise StateTimeoutError("the fingers may still move")
 
 
@@ -426,7 +426,7 @@ async def test_a_late_halt_that_does_not_show_is_an_error_in_the_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """It was taken for one that came too late, and nothing said that the fingers may move."""
-    async with Disobedient() as hand:
+    async with FakeHand(kind=Disobedient) as hand:
         pending = PendingStop(hand)
         pending.schedule(hand.halt)
         while pending.is_pending:  # noqa: ASYNC110  # there is no event to wait for

@@ -17,7 +17,7 @@ from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import Request
-from tests.fake_hand import FakeHand
+from tests.fake_hand import FakeBackend, FakeHand
 from tests.grippers import activate_beforehand, shows
 
 pytestmark = pytest.mark.virtual_time
@@ -101,20 +101,20 @@ async def test_a_canceled_goal_does_not_hold_what_the_next_one_moves(hand: Robot
     assert hand.status.position(A) >= 228
 
 
-class DeafHand(FakeHand):
+class DeafBackend(FakeBackend):
     """Its gripper moves for ever, and takes no hold."""
 
-    async def _move(self, axes: Finger, target: int, *_: Any) -> MoveResult:
-        self.command(axes, position=target)
+    async def move(self, axes: Finger, target: int, *_: Any) -> MoveResult:
+        self.command(axes, target, None, None)
         await asyncio.Event().wait()
         raise AssertionError
 
-    async def _hold(self, axes: Finger) -> None:  # noqa: ARG002
+    async def hold(self, axes: Finger) -> None:  # noqa: ARG002
         raise ConnectionLostError("the link went down")
 
 
 async def test_a_hold_that_is_not_acknowledged_aborts_the_goal(caplog: pytest.LogCaptureFixture) -> None:
-    async with DeafHand() as hand:
+    async with FakeHand(kind=DeafBackend) as hand:
         runner, requests = GoalRunner(hand), hand.requests()
         goal = begin(runner)
         await anext(requests)
@@ -126,11 +126,11 @@ async def test_a_hold_that_is_not_acknowledged_aborts_the_goal(caplog: pytest.Lo
     assert "the hold was not acknowledged: the link went down" in caplog.text
 
 
-class LingeringHand(FakeHand):
+class LingeringBackend(FakeBackend):
     """A move that is cancelled takes a second to end."""
 
-    async def _move(self, axes: Finger, target: int, *_: Any) -> MoveResult:
-        self.command(axes, position=target)
+    async def move(self, axes: Finger, target: int, *_: Any) -> MoveResult:
+        self.command(axes, target, None, None)
         try:
             await asyncio.Event().wait()
         finally:
@@ -141,7 +141,7 @@ class LingeringHand(FakeHand):
 async def test_a_goal_that_is_given_up_while_it_waits_keeps_none_waiting() -> None:
     """The next one waited for it for ever."""
     loop = asyncio.get_running_loop()
-    async with LingeringHand() as hand:
+    async with FakeHand(kind=LingeringBackend) as hand:
         runner, requests = GoalRunner(hand), hand.requests()
         first = begin(runner)
         await anext(requests)

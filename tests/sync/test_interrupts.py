@@ -102,7 +102,7 @@ def test_an_unsent_request_never_begins(hand: RobotiqHand, wire: Wire, interrupt
     def strike() -> None:
         until(lambda: bool(hand._caller._calls))
         interrupt()
-        session = hand._inner._session
+        session = hand._inner._local.session
         assert session is not None
         until(lambda: is_caught.is_set() or session.controller.has_open_stop)
         wire.is_slow = False

@@ -2,38 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Collection
-from typing import Any, Final, Literal
-
 from ...calibration import ForceCalibration, SpeedCalibration
-from ...hands import Hand, StateWaiters, Statistics
-from ...runtime import Limit
-from ...values import (
-    Finger,
-    Inhibit,
-    MoveResult,
-    NotStartedError,
-    RobotiqConnectionError,
-    RobotiqStatus,
-    State,
-    Trigger,
-    check_seconds,
-)
-from ..errors import AgentError
+from ...hands import Hand
 from ..network.bus import Bus
-from ..network.route import parse_remote_address
-from ..wire.values import Fields, reading
+from .backend import RemoteBackend
 from .errand import no_answer_as_lost_connection
-from .lease_state import own_label
-from .session import CONNECT_S, RemoteSession
-
-REMOTE_COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
-SEQUENCE_S: Final = 130.0
-MOVE_S: Final = 100.0  # without a timeout
-_LIMIT_S: Final = {"move": MOVE_S} | dict.fromkeys(("activate", "reset", "atr", "recover"), SEQUENCE_S)
-"""For the answer to a command; the agent's own limits are shorter."""
-SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
+from .session import CONNECT_S
 
 
 class RemoteHand(Hand):
@@ -58,7 +32,8 @@ class RemoteHand(Hand):
       has heard of; a later halt stays, and RobotiqStateError is raised.
     * Millimetres and fractions follow the ``stroke`` of the agent's hand. They are sent as counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
-      may be missing, and :meth:`grip_events` follows the statuses that arrived.
+      may be missing, and :meth:`grip_events` follows the statuses that arrived. :attr:`statistics` are the agent's,
+      at most 1 s old.
 
     The safety of people must not depend on it: a network can be cut at any moment. None of this has run on
     real hardware yet. Making a hand checks every option; it opens nothing and needs no running loop.
@@ -81,8 +56,6 @@ class RemoteHand(Hand):
         ValueError: an option outside its range, or a malformed address.
     """
 
-    _session: RemoteSession | None = None
-
     def __init__(
         self,
         address: str,
@@ -94,80 +67,23 @@ class RemoteHand(Hand):
         force_calibration: ForceCalibration | None = None,
         keep_grip: bool = False,
     ) -> None:
-        if control is not None and not isinstance(control, bool):
-            raise TypeError(f"control must be True, False or None, got {control!r}")
-        self._gripper, self._route = parse_remote_address(address)
-        self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
-        self._control = control
-        super().__init__(
-            str(self._gripper),
-            keep_grip=keep_grip,
+        self._remote = RemoteBackend(
+            address,
+            control=control,
+            connect_timeout=connect_timeout,
+            bus=bus,
             calibration=calibration,
             force_calibration=force_calibration,
+            keep_grip=keep_grip,
         )
-        if bus is None:
-            self._route.configuration()  # a malformed or unprotected route fails here, not at the start
-        self._shared_bus = bus
-        self._opening: object = None
-        """Identifies the start that opens a bus; None without a start, or if stop() was called."""
-
-    # -- lifetime --------------------------------------------------------------------------------------
-
-    @property
-    def _is_started(self) -> bool:
-        return self._opening is not None or (self._session is not None and not self._session.dialog.has_ended)
-
-    async def _start(self, activate: bool, wait: float) -> None:
-        before = self._session
-        bus = await self._open_bus()
-        self._session = session = RemoteSession(
-            self._gripper,
-            bus,
-            self._channels,
-            owns_bus=bus is not self._shared_bus,
-            before=None if before is None else before.dialog,
-        )
-        try:
-            with no_answer_as_lost_connection():
-                await session.connect(max(self._connect_timeout, wait), acquires=self._control is True)
-            _ = self.units  # a calibration of another model fails here, before anything moves
-            activates = activate and self._control
-            if activates and self.state in (State.RESET, State.DO_ACTIVATION, State.WF_ACTIVATION):
-                await self.activate()
-        except BaseException:
-            await self.stop()
-            raise
-
-    async def _stop(self, halt: bool, keep_grip: bool) -> None:
-        self._opening = None
-        session = self._session
-        if session is not None and not session.dialog.has_ended:
-            self._check_called_in_loop()
-            session.dialog.clear("stopped")
-            await session.close(self._stop_level(halt, keep_grip))
-
-    async def _open_bus(self) -> Bus:
-        if self._shared_bus is not None:
-            return self._shared_bus
-        from ..network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
-
-        self._opening = opening = object()
-        try:
-            bus = await open_bus(self._route.configuration(), self._address)
-            if self._opening is not opening:
-                await bus.close()
-                raise NotStartedError("stop() was called during the start")
-        finally:
-            if self._opening is opening:
-                self._opening = None
-        return bus
+        super().__init__(self._remote)
 
     # -- the lease -------------------------------------------------------------------------------------
 
     @property
     def is_in_control(self) -> bool:
         """Whether this hand holds the lease, as far as it knows."""
-        session = self._session
+        session = self._remote.session
         return session is not None and not session.is_over and session.dialog.lease.is_held
 
     async def acquire(self) -> None:
@@ -178,7 +94,7 @@ class RemoteHand(Hand):
             RobotiqError: not started, or the agent does not answer.
         """
         with no_answer_as_lost_connection():
-            await self._running_session().keeper.acquire()
+            await self._remote.running_session().keeper.acquire()
 
     async def take(self) -> None:
         """Get the lease, also from another client; axes that this client set in motion are held.
@@ -187,7 +103,7 @@ class RemoteHand(Hand):
             RobotiqError: not started, or the agent does not answer.
         """
         with no_answer_as_lost_connection():
-            await self._running_session().keeper.acquire(take=True)
+            await self._remote.running_session().keeper.acquire(take=True)
 
     async def release(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Release the lease, and continue to read.
@@ -199,148 +115,8 @@ class RemoteHand(Hand):
         Raises:
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
-        level = self._stop_level(halt, keep_grip)
-        keeper = self._running_session().keeper
+        level = self._remote.stop_level(halt, keep_grip)
+        keeper = self._remote.running_session().keeper
         keeper.release(level)
         with no_answer_as_lost_connection():
             await keeper.released()
-
-    # -- commands --------------------------------------------------------------------------------------
-
-    async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
-        await self._ask(f"set_{what}", value=value, fingers=int(axes))
-
-    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
-        session = self._running_session()
-        session.check_control()
-        self._check_allowed(Trigger.ASK_COMMAND, presses=position is not None or force is not None)
-        changes = {"position": position, "speed": speed, "force": force}
-        session.dialog.put(axes, {name: value for name, value in changes.items() if value is not None})
-
-    async def _move(
-        self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
-    ) -> MoveResult:
-        value = await self._ask(
-            "move", position=target, fingers=int(axes), speed=speed, force=force, timeout=timeout
-        )
-        with reading("a result"):
-            return MoveResult.from_dict(value, self._running_session().mirror.read_status(value["status"]))
-
-    async def _hold(self, axes: Finger) -> None:
-        await self._ask("hold", fingers=int(axes))
-
-    async def _inhibit(self, inhibit: Inhibit) -> None:
-        arguments = {"inhibit": inhibit.reason, "who": inhibit.who}
-        self._take_over_inhibit(await self._halted(arguments))
-
-    async def _permit(self, who: str, seen: Inhibit | None) -> None:
-        session = self._running_session()
-        named = seen or session.mirror.inhibited  # a halt that overtakes this permit stays
-        arguments: Fields = {"what": "permit", "label": own_label(), "who": who}
-        arguments["inhibited"] = None if named is None else named.as_dict()
-        with no_answer_as_lost_connection():
-            self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=REMOTE_COMMAND_S))
-
-    def _take_over_inhibit(self, answer: Fields) -> None:
-        if "inhibited" not in answer:
-            raise AgentError(f"{self._gripper}: its agent is older: it halts, and inhibits nothing")
-        assert self._session is not None, "it has answered"
-        with reading("an inhibit"):
-            self._session.mirror.receive_inhibit(answer)
-
-    @property
-    def inhibited(self) -> Inhibit | None:
-        """The reason for which the agent refuses motion, since when, by whom; None if none is known."""
-        return None if self._session is None else self._session.mirror.inhibited
-
-    async def _halt(self) -> None:
-        await self._halted()
-
-    async def _halted(self, arguments: Fields | None = None) -> Fields:
-        session = self._running_session()
-        session.dialog.clear()
-        halting = session.dialog.halt(arguments=arguments)
-        try:
-            with no_answer_as_lost_connection():
-                answer: Fields = await asyncio.shield(halting)
-        except asyncio.CancelledError:
-            if not halting.cancelled():
-                # The halt continues. Its error is retrieved, or asyncio would log that it never was.
-                halting.add_done_callback(lambda task: task.cancelled() or task.exception())
-            elif session.is_over:
-                raise NotStartedError("the hand was stopped") from None
-            raise
-        return answer
-
-    async def _activate(self) -> None:
-        await self._ask("activate")
-
-    async def _reset(self) -> None:
-        await self._ask("reset")
-
-    async def _atr(self) -> None:
-        await self._ask("atr")
-
-    async def _recover(self, timeout: float | None) -> None:
-        await self._ask("recover", timeout=timeout)
-
-    async def _ask(self, name: str, **arguments: Any) -> Fields:  # noqa: ANN401  # any JSON
-        """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
-        timeout = arguments.get("timeout")
-        seconds = _LIMIT_S.get(name, REMOTE_COMMAND_S) if timeout is None else timeout + SLACK_S
-        session = self._running_session()
-        dialog = session.dialog
-        if self._control is None and not dialog.lease.is_held and dialog.lease.lost is None:
-            with no_answer_as_lost_connection():
-                await session.keeper.acquire()
-        session.check_control()
-        # Earlier commands are sent first.
-        dialog.flush()
-        call = dialog.call(arguments)
-        try:
-            with no_answer_as_lost_connection():
-                value: Fields = await dialog.send(call, f"cmd/{name}", timeout=seconds)
-        except (asyncio.CancelledError, RobotiqConnectionError):
-            # Also after an error that does not say whether the request was carried out.
-            dialog.cancel(name, call)
-            raise
-        return value
-
-    # -- what the hand shows ---------------------------------------------------------------------------
-
-    @property
-    def state(self) -> State:
-        """The state of the agent's hand; DISCONNECTED also while the agent is silent."""
-        return State.DISCONNECTED if self._session is None else self._session.mirror.state
-
-    @property
-    def statistics(self) -> Statistics:
-        """Figures of the agent's polling, at most 1 s old."""
-        return Statistics.none() if self._session is None else self._session.statistics
-
-    @property
-    def _points(self) -> tuple[tuple[int, float], ...]:
-        """The measured points of the agent's hand, which has the option ``stroke``."""
-        return () if self._session is None else self._session.mirror.points
-
-    @property
-    def _newest_status(self) -> RobotiqStatus | None:
-        return None if self._session is None else self._session.mirror.status
-
-    def _is_moving(self) -> bool:
-        assert self._session is not None, "the hand runs"
-        newest = self._session.mirror.newest
-        return self._session.dialog.is_moving or (newest is not None and newest.is_moving)
-
-    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
-        with self._running_session().waiters.watching(states, {}) as reached, Limit(timeout):
-            return await reached
-        names = " or ".join(state.name for state in states)
-        raise StateWaiters.late(f"{names} was not reached", timeout, self.state)
-
-    def _running_session(self) -> RemoteSession:
-        # Refuses before start(), after stop(), and from another loop.
-        self._check_running()
-        assert self._session is not None, "it runs"
-        self._check_called_in_loop()
-        return self._session
