@@ -26,7 +26,7 @@ from robotiq_async.simulator import (
     UrcapSimulatorServer,
 )
 from robotiq_async.simulator.troubles.corruption import ReplyPolicy
-from robotiq_async.sync.loop_thread import LOOP_THREAD
+from robotiq_async.sync.loop_thread import LOOP_THREAD, _ThreadedCall
 from tests.grippers import activate_beforehand
 from tests.virtual import NothingWillHappenError, VirtualClock, VirtualLoop
 from tests.virtual_line import VirtualLine
@@ -64,7 +64,9 @@ class LockstepLoop(VirtualLoop):
 
     def create_task(self, coro: Any, **options: Any) -> Any:
         task = super().create_task(coro, **options)
-        if getattr(coro, "__qualname__", "") == "_Call._run":  # a call that the program waits for
+        if (
+            getattr(coro, "__qualname__", "") == _ThreadedCall._run.__qualname__
+        ):  # a call that the program waits for
             self._lockstep.calls += 1
             task.add_done_callback(self._made)
         return task

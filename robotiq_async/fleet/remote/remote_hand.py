@@ -32,8 +32,8 @@ class RemoteHand(Hand):
       has heard of; a later halt stays, and RobotiqStateError is raised.
     * Millimetres and fractions follow the ``stroke`` of the agent's hand. They are sent as counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
-      may be missing, and :meth:`grip_events` follows the statuses that arrived. :attr:`statistics` are the agent's,
-      at most 1 s old.
+      may be missing, and :meth:`grip_events` follows the statuses that arrived. :attr:`statistics` are
+      the agent's, at most 1 s old.
 
     The safety of people must not depend on it: a network can be cut at any moment. None of this has run on
     real hardware yet. Making a hand checks every option; it opens nothing and needs no running loop.
