@@ -20,8 +20,8 @@ import os
 import signal
 import socket
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Final
@@ -166,50 +166,76 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
         if not isinstance(each, Hand):
             raise TypeError(f"hands must be hands for asyncio, got {each!r}")
     check_main_thread()
-    loop, signals, stopping = asyncio.get_running_loop(), Signals(), list[asyncio.Task[None]]()
-    insist_at = 0.0  # from when on a further signal acts
-    scope = anyio.CancelScope()
+    stops = _SignalStops(hands, forward=forward)
+    with stops.handling():
+        try:
+            with stops.scope:
+                yield stops.signals
+        except (NotStartedError, BaseExceptionGroup) as error:
+            if not stops.signals.received:
+                raise
+            if (others := _without_stopped(error)) is not None:
+                raise others from None
+        finally:
+            await stops.ended()
 
-    async def stop(number: int) -> None:
-        for stopped in await asyncio.gather(*(each.stop() for each in hands), return_exceptions=True):
-            if isinstance(stopped, BaseException):
-                log.error("a hand could not be stopped: %r", stopped)
-        if forward and callable(previous[number]):
-            previous[number](number, None)
-        else:
-            scope.cancel()
 
-    def begin(number: int) -> None:
-        nonlocal insist_at
-        insist_at = time.monotonic() + INSIST_S
-        stopping.append(loop.create_task(stop(number)))
+class _SignalStops:
+    """Stops hands at the first signal, and then leaves ``scope``, or passes the signal on."""
 
-    def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal insist_at
-        if not signals.received:
-            signals.note(number)
-            insist_at = time.monotonic() + INSIST_S
+    def __init__(self, hands: Sequence[Hand], *, forward: bool) -> None:
+        self.signals = Signals()
+        self.scope = anyio.CancelScope()
+        self._hands = hands
+        self._forward = forward
+        self._loop = asyncio.get_running_loop()
+        self._stopping: list[asyncio.Task[None]] = []
+        self._insist_at = 0.0
+        """The time from which a further signal acts."""
+        self._previous: dict[int, Any] = {}
+
+    @contextmanager
+    def handling(self) -> Iterator[None]:
+        """Handle signals, and leave the handlers as they were."""
+        self._previous = {number: signal.getsignal(number) for number in ending_signals()}
+        try:
+            for number in self._previous:
+                signal.signal(number, self._handle)
+            yield
+        finally:
+            for number, handler in self._previous.items():
+                signal.signal(number, handler)
+
+    async def ended(self) -> None:
+        """Wait for the end of the stops, also when cancelled."""
+        if self._stopping:
+            with anyio.CancelScope(shield=True):
+                await asyncio.wait(self._stopping)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if not self.signals.received:
+            self.signals.note(number)
+            self._insist_at = time.monotonic() + INSIST_S
             # A signal interrupts the loop anywhere: a stop has to begin in another turn.
             with suppress(RuntimeError):  # the loop was closed
-                loop.call_soon_threadsafe(begin, number)
-        elif time.monotonic() > insist_at:
-            pass_on(previous[number], number, frame)
+                self._loop.call_soon_threadsafe(self._begin, number)
+        elif time.monotonic() > self._insist_at:
+            pass_on(self._previous[number], number, frame)
 
-    previous: dict[int, Any] = {number: signal.signal(number, handle) for number in ending_signals()}
-    try:
-        with scope:
-            yield signals
-    except (NotStartedError, BaseExceptionGroup) as error:
-        if not signals.received:
-            raise
-        if (others := _without_stopped(error)) is not None:
-            raise others from None
-    finally:
-        if stopping:
-            with anyio.CancelScope(shield=True):
-                await asyncio.wait(stopping)
-        for number, handler in previous.items():
-            signal.signal(number, handler)
+    def _begin(self, number: int) -> None:
+        self._insist_at = time.monotonic() + INSIST_S
+        self._stopping.append(self._loop.create_task(self._stop(number)))
+
+    async def _stop(self, number: int) -> None:
+        stops = (each.stop() for each in self._hands)
+        for stopped in await asyncio.gather(*stops, return_exceptions=True):
+            if isinstance(stopped, BaseException):
+                log.error("a hand could not be stopped: %r", stopped)
+        before = self._previous[number]
+        if self._forward and callable(before):
+            before(number, None)
+        else:
+            self.scope.cancel()
 
 
 def _without_stopped(error: NotStartedError | BaseExceptionGroup[BaseException]) -> BaseException | None:

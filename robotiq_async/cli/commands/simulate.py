@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import errno
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -110,66 +111,49 @@ async def simulate(
         trouble: A trouble, as above; may be given again.
         troubles: List the kinds of trouble, and end.
     """
-    from ...simulator import (
-        Likeness,
-        PhysicsError,
-        SimulatedGripper,
-        own_habits,
-        parse_troubles,
-    )
+    from ...simulator import Likeness, parse_troubles
 
     if troubles:
         _list_troubles()
         return
+    link = _ServedLink(port, host, serial, rtu_over_tcp=rtu_over_tcp, urcap=urcap, unpaced=unpaced)
     with usage():
         likeness = None if like is None else Likeness.from_file(like)
         if likeness is not None:
             _check_alone(likeness, model, object_, physics, exact)
         kinds = [model_of(each) for each in model or ["3f"]] if likeness is None else [likeness.model]
         units: Sequence[int | None] = device_id or [getattr(likeness, "device_id", None)]
-        _check_line(kinds, units, is_line=serial is not None or rtu_over_tcp)
-        _check_wire(
-            kinds[0], serial=serial is not None, rtu_over_tcp=rtu_over_tcp, urcap=urcap, unpaced=unpaced
-        )
+        _check_line(kinds, units, is_line=link.is_line)
+        link.check(kinds[0])
         plan = parse_troubles("\n".join(trouble or ()))
-
-        def made(kind: Model) -> SimulatedGripper:
-            if likeness is not None:
-                return likeness.gripper(time.monotonic, speedup=speedup)
-            habits = own_habits(kind) if like_hardware else None
-            moved = _physics(physics, object_)
-            return SimulatedGripper(
-                speedup=speedup, spread=not exact, habits=habits, model=kind, physics=moved
-            )
-
-        grippers = [made(kind) for kind in _of_each(kinds, units)]
+        grippers = [
+            likeness.gripper(time.monotonic, speedup=speedup)
+            if likeness is not None
+            else _gripper(each, speedup, like_hardware, exact, _physics(physics, object_))
+            for each in _of_each(kinds, units)
+        ]
         for each in grippers:
             _place(each, object_, fixed=fixed)
-        wire = _ServedLink(port, host, serial, rtu_over_tcp=rtu_over_tcp, urcap=urcap, paced=not unpaced)
-        server = wire.server(grippers, units)
+        server = link.server(grippers, units)
         server.fault_injector.check(plan)
-    if serial is None and not is_loopback(host):
+    if link.is_open_to_others:
         tell(f"anyone who reaches {host} can command this gripper")
     asyncio.get_running_loop().set_exception_handler(_without_tracebacks())
-    try:
-        with normal_end():
-            async with server:
-                if likeness is not None:
-                    _tell_of(likeness)
-                    await likeness.begin(server)
-                # A URCap reads its gripper all the time, so there is no silence to simulate.
-                elif like_hardware and not urcap:
-                    await _begin_habits(server)
-                print(server.address, flush=True)
-                await _play(server, plan)
-    except (ImportError, PhysicsError) as error:
-        raise RobotiqError(str(error)) from error
-    except BrokenPipeError:
-        raise  # the reader of the address has gone
-    except OSError as error:
-        if serial is not None:
-            raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
-        raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+    with link.named_errors(), normal_end():
+        async with server:
+            # A URCap reads its gripper all the time, so there is no silence to simulate.
+            await _begin(server, likeness, has_habits=like_hardware and not urcap)
+            print(server.address, flush=True)
+            await _play(server, plan)
+
+
+def _gripper(
+    model: Model, speedup: float, like_hardware: bool, exact: bool, physics: Physics | None
+) -> SimulatedGripper:
+    from ...simulator import SimulatedGripper, own_habits
+
+    habits = own_habits(model) if like_hardware else None
+    return SimulatedGripper(speedup=speedup, spread=not exact, habits=habits, model=model, physics=physics)
 
 
 async def _play(server: SimulatorServer | SerialSimulatorServer, plan: Sequence[Trouble]) -> None:
@@ -199,7 +183,41 @@ class _ServedLink:
     serial: str | None
     rtu_over_tcp: bool
     urcap: bool
-    paced: bool
+    unpaced: bool
+
+    @property
+    def is_line(self) -> bool:
+        return self.serial is not None or self.rtu_over_tcp
+
+    @property
+    def is_open_to_others(self) -> bool:
+        return self.serial is None and not is_loopback(self.host)
+
+    def check(self, model: Model) -> None:
+        """Refuse options that do not go together."""
+        if (self.serial is not None) + self.rtu_over_tcp + self.urcap > 1:
+            raise ValueError("--serial, --rtu-over-tcp and --urcap cannot be combined")
+        if self.urcap and len(model.axes) > 1:
+            raise ValueError("a URCap has a 2F or a Hand-E: --model 2f85, 2f140 or hand-e")
+        if self.unpaced and not self.is_line:
+            raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
+
+    @contextmanager
+    def named_errors(self) -> Iterator[None]:
+        """Errors of the place and of the physics, in a sentence for the user."""
+        from ...simulator import PhysicsError
+
+        try:
+            yield
+        except (ImportError, PhysicsError) as error:
+            raise RobotiqError(str(error)) from error
+        except BrokenPipeError:
+            raise  # the reader of the address has gone
+        except OSError as error:
+            if self.serial is not None:
+                raise RobotiqError(f"cannot listen on {self.serial}: {why_no_port(error)}") from error
+            where = f"{self.host}:{self.port}"
+            raise RobotiqError(f"cannot listen on {where}: {error.strerror or error}") from error
 
     def server(
         self, grippers: Sequence[SimulatedGripper], units: Sequence[int | None]
@@ -215,27 +233,32 @@ class _ServedLink:
         unit = RTU_REGISTERS.device_id if units[0] is None else units[0]
         others = {each: gripper for each, gripper in zip(units[1:], grippers[1:], strict=True) if each}
         if self.serial is not None:
-            return SerialSimulatorServer(self.serial, first, device_id=unit, paced=self.paced, others=others)
+            return SerialSimulatorServer(
+                self.serial, first, device_id=unit, paced=not self.unpaced, others=others
+            )
         if self.rtu_over_tcp:
             return RtuOverTcpSimulatorServer(
-                first, port=self.port, host=self.host, device_id=unit, paced=self.paced, others=others
+                first, port=self.port, host=self.host, device_id=unit, paced=not self.unpaced, others=others
             )
         if self.urcap:
             return UrcapSimulatorServer(first, port=self.port, host=self.host, device_id=unit)
         return SimulatorServer(first, port=self.port, host=self.host, device_id=units[0])
 
 
-async def _begin_habits(server: SimulatorServer | SerialSimulatorServer) -> None:
+async def _begin(
+    server: SimulatorServer | SerialSimulatorServer, likeness: Likeness | None, *, has_habits: bool
+) -> None:
+    """Begin what lasts from the start on: the troubles of a report, or the habits of each gripper."""
     from ...simulator import like_hardware
 
-    for each in (server, *getattr(server, "others", {}).values()):
-        for habit in like_hardware(each.gripper.model):
-            await each.fault_injector.begin(habit)
-
-
-def _tell_of(likeness: Likeness) -> None:
-    if likeness.unknown:
-        tell(f"not simulated, though it differs in the report: {', '.join(likeness.unknown)}")
+    if likeness is not None:
+        if likeness.unknown:
+            tell(f"not simulated, though it differs in the report: {', '.join(likeness.unknown)}")
+        await likeness.begin(server)
+    elif has_habits:
+        for each in (server, *getattr(server, "others", {}).values()):
+            for habit in like_hardware(each.gripper.model):
+                await each.fault_injector.begin(habit)
 
 
 def _check_alone(likeness: Likeness, *others: object) -> None:
@@ -260,15 +283,6 @@ def _check_line(kinds: Sequence[Model], units: Sequence[int | None], *, is_line:
 
 def _of_each(kinds: Sequence[Model], units: Sequence[int | None]) -> Sequence[Model]:
     return kinds if len(kinds) == len(units) else [*kinds] * len(units)
-
-
-def _check_wire(model: Model, *, serial: bool, rtu_over_tcp: bool, urcap: bool, unpaced: bool) -> None:
-    if serial + rtu_over_tcp + urcap > 1:
-        raise ValueError("--serial, --rtu-over-tcp and --urcap cannot be combined")
-    if urcap and len(model.axes) > 1:
-        raise ValueError("a URCap has a 2F or a Hand-E: --model 2f85, 2f140 or hand-e")
-    if unpaced and not serial and not rtu_over_tcp:
-        raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
 
 
 def _without_tracebacks() -> Callable[[asyncio.AbstractEventLoop, dict[str, Any]], None]:

@@ -122,29 +122,40 @@ class World:
             return
         if self._parts:
             self._set_aside(self._is_taken or any(motor.clears for motor in motors))
-        for motor in motors:
-            index = motor.index
-            self._controls[index], limit = motor.command(step_s)
-            self._limits[2 * index], self._limits[2 * index + 1] = -limit, limit
-        if self._mount is not None and self._lifted != self._height:
-            way = self._height - self._lifted
-            self._lifted += min(max(way, -_LIFTING * step_s), _LIFTING * step_s)
-            self._controls[self._mount] = self._lifted
-        mujoco.mj_step(self._model, self._data)
-        before, self.time = self.time, self._data.time
-        lengths = [self._lengths[motor.index] for motor in motors]
-        # MuJoCo begins again at 0 with bodies that have become unstable, unless a file forbids it.
-        if not self.time > before or any(map(isnan, lengths)):
-            raise RuntimeError(
-                f"they became unstable after {before:.3f} s (timestep {step_s:g} s): smaller steps,"
-                " softer contacts or parts of a sensible size and mass help"
-            )
+        self._command_motors()
+        self._raise_mount()
+        lengths = self._pass_step()
         for motor, length in zip(motors, lengths, strict=True):
             motor.see(length, step_s)
         if self._hands:
             fingers = [motor for axis, motor in self.drives.items() if axis is not Finger.SCISSOR]
             if all(motor.outcome.is_contact for motor in fingers):
                 self._let_go()
+
+    def _command_motors(self) -> None:
+        for motor in self._motors:
+            index = motor.index
+            self._controls[index], limit = motor.command(self.step_s)
+            self._limits[2 * index], self._limits[2 * index + 1] = -limit, limit
+
+    def _raise_mount(self) -> None:
+        if self._mount is not None and self._lifted != self._height:
+            most = _LIFTING * self.step_s
+            self._lifted += min(max(self._height - self._lifted, -most), most)
+            self._controls[self._mount] = self._lifted
+
+    def _pass_step(self) -> list[float]:
+        """Let one step pass; the places of the motors after it."""
+        mujoco.mj_step(self._model, self._data)
+        before, self.time = self.time, self._data.time
+        lengths = [self._lengths[motor.index] for motor in self._motors]
+        # MuJoCo begins again at 0 with bodies that have become unstable, unless a file forbids it.
+        if not self.time > before or any(map(isnan, lengths)):
+            raise RuntimeError(
+                f"they became unstable after {before:.3f} s (timestep {self.step_s:g} s): smaller steps,"
+                " softer contacts or parts of a sensible size and mass help"
+            )
+        return lengths
 
     def lift(self, millimetres: float) -> None:
         """Begin to raise the gripper to so many millimetres above its first place."""

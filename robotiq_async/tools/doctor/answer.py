@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 from ...hands import LONGEST_RESPONSE_S
@@ -62,56 +62,90 @@ STRANGER: Final = "gripper"
 """The subject of a finding if a device answers that is no gripper."""
 
 
+class _FirstReading(NamedTuple):
+    """The first status on a link, which is open then."""
+
+    link: Link
+    status: RobotiqStatus
+    seconds: float  # until the reply
+
+
+@dataclass
+class _Attempts:
+    """The attempts so far, of which none has found a gripper."""
+
+    failure: RobotiqConnectionError | None = None  # of the first that had no answer
+    echoes: bool = False
+    stranger: str = ""  # why a device that answered is no gripper
+
+    def note_failure(self, error: RobotiqConnectionError, link: Link) -> None:
+        self.failure = self.failure or error
+        self.echoes = self.echoes or _echoes(link)
+
+    def note_stranger(self, why: str) -> None:
+        self.stranger = self.stranger or why
+
+    async def reported(self, address: Address, report: ReportFinding) -> GiveUpError:
+        """Report why none has found one; the error that ends the search."""
+        if self.stranger:
+            _report_stranger(self.stranger, report)
+            return GiveUpError()
+        assert self.failure is not None, "each attempt has failed, or has met a stranger"
+        advice = await _other_frames(address) or _advice_for_silence(address, self.failure, self.echoes)
+        report(Finding(Level.BAD, "Modbus", str(self.failure), advice))
+        return GiveUpError()
+
+
 async def find_gripper(address: Address, usual: RegisterMap, report: ReportFinding) -> Answering:
     """Find the unit id and the registers under which a gripper answers; returns an open link to it.
 
     It opens no extra connection to test the port, which would occupy a gateway that serves one client.
     """
-    failure: RobotiqConnectionError | None = None
-    echoes = False
-    stranger = ""
+    attempts = _Attempts()
     for number, (registers, patience) in enumerate(_attempts(address, usual)):
-        link = _link(address, registers, patience)
+        link, reading = _link(address, registers, patience), None
         try:
-            status, seconds = await _first_reading(link)
+            reading = await _first_reading(link)
         except ConnectFailedError as error:
             _report_no_connection(address, error, report, is_first=number == 0)
             raise GiveUpError from error
         except RobotiqConnectionError as error:
-            if number == 0:
-                _report_port(address, report)
-            failure = failure or error
-            echoes = echoes or _echoes(link)
-            await asyncio.sleep(LET_GO_S if number < PROBE_TRIES else 0)
-            continue
+            attempts.note_failure(error, link)
         if number == 0:
             _report_port(address, report)
-        if why := why_stranger(status.registers):
+        if reading is None:
+            await asyncio.sleep(LET_GO_S if number < PROBE_TRIES else 0)
+        elif why := why_stranger(reading.status.registers):
             await link.close()
-            stranger = stranger or why
-            continue
-        tries = number + 1
-        if registers != usual and (again := await _ask_again(address, usual, link)) is not None:
+            attempts.note_stranger(why)
+        elif registers != usual and (again := await _ask_again(address, usual, link)) is not None:
             # The line had lost the first requests, of any kind: nothing about this gripper is unusual.
-            (link, status, seconds), registers, tries = again, usual, tries + 1
-        if _echoes(link):
-            report(Finding(Level.GOOD, "echo", "the line echoes what is sent, and the echo is dropped"))
-        report(_answers(address, failure if registers == usual else None, tries, seconds))
-        _report_place(usual, registers, report)
-        report_silence(status, report)
-        return Answering(link, registers)
-    if stranger:
-        _report_stranger(stranger, report)
-        raise GiveUpError
-    assert failure is not None
-    advice = await _other_frames(address) or _advice_for_silence(address, failure, echoes)
-    report(Finding(Level.BAD, "Modbus", str(failure), advice))
-    raise GiveUpError
+            return _found(address, usual, again, usual, attempts.failure, number + 2, report)
+        else:
+            failure = attempts.failure if registers == usual else None
+            return _found(address, usual, reading, registers, failure, number + 1, report)
+    raise await attempts.reported(address, report)
 
 
-async def _ask_again(
-    address: Address, usual: RegisterMap, other: Link
-) -> tuple[Link, RobotiqStatus, float] | None:
+def _found(
+    address: Address,
+    usual: RegisterMap,
+    reading: _FirstReading,
+    registers: RegisterMap,
+    failure: RobotiqConnectionError | None,
+    tries: int,
+    report: ReportFinding,
+) -> Answering:
+    """Report a gripper that answers."""
+    if _echoes(reading.link):
+        report(Finding(Level.GOOD, "echo", "the line echoes what is sent, and the echo is dropped"))
+    report(_answers(address, failure, tries, reading.seconds))
+    _report_place(usual, registers, report)
+    report_silence(reading.status, report)
+    return Answering(reading.link, registers)
+
+
+async def _ask_again(address: Address, usual: RegisterMap, other: Link) -> _FirstReading | None:
     """Read with the usual unit id and registers again; None if only ``other`` answers, which is open then.
 
     Some lines lose the first requests of a connection, or of a client. Settings that answered after them
@@ -122,13 +156,13 @@ async def _ask_again(
         await asyncio.sleep(LET_GO_S)
         link = _link(address, usual, ANSWER_S)
         try:
-            status, seconds = await _first_reading(link)
+            reading = await _first_reading(link)
         except RobotiqConnectionError:
             continue
-        if why_stranger(status.registers):
+        if why_stranger(reading.status.registers):
             await link.close()
             break
-        return link, status, seconds
+        return reading
     await asyncio.sleep(LET_GO_S)
     await _first_reading(other)
     return None
@@ -181,13 +215,14 @@ def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
     return ModbusTransport(address, registers, connect_timeout=REACH_S, response_timeout=patience)
 
 
-async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
-    # Also returns the seconds until the reply. Closes the link when no reply comes.
+async def _first_reading(link: Link) -> _FirstReading:
+    # Closes the link when no reply comes.
     loop = asyncio.get_running_loop()
     try:
         await link.open()
         asked = loop.time()
-        return RobotiqStatus.from_registers(await link.read()), loop.time() - asked
+        status = RobotiqStatus.from_registers(await link.read())
+        return _FirstReading(link, status, loop.time() - asked)
     except BaseException:
         await link.close()
         raise

@@ -69,9 +69,7 @@ def plot_recordings(path: Path, recordings: Sequence[RecordingCurves]) -> list[P
 
 def draw(recordings: Sequence[RecordingCurves]) -> Figure:
     """The figure: for each recording its events, and below them openings, a scissor and currents."""
-    begin = min(float(each.seconds[0]) for each in recordings)
-    end = max(float(each.seconds[-1]) for each in recordings)
-    end = end if end > begin else begin + 1.0
+    begin, end = _span(recordings)
     inches = WIDTH_ALONE if len(recordings) == 1 else WIDTH_BESIDE
     inside = inches - BESIDE
     labels = [list(joined(each.events, LABEL_SIZE / inside * (end - begin))) for each in recordings]
@@ -91,17 +89,35 @@ def draw(recordings: Sequence[RecordingCurves]) -> Figure:
         strip, *below = grid[:, number]
         strip.set_title(curves.title, fontsize=9, parse_math=False)
         _write_labels(strip, placed[number], begin, end, rows)
-        for panel, axes in zip(panels, below, strict=True):
-            _draw_panel(panel, axes, curves, inches)
-            for when, _, is_fault in labels[number]:
-                axes.axvline(when, color=_color(is_fault), lw=0.6, alpha=0.7, zorder=0.6)
-        shown = [axes for axes in below if axes.get_visible()]
-        shown[-1].set_xlabel("time, s", fontsize=9)
-        shown[-1].tick_params(labelbottom=True)
+        _draw_column(below, panels, curves, labels[number], inches)
         strip.set_xlim(begin, end)
     for panel, line in zip(panels, grid[1:], strict=True):
         _same_scale([axes for axes in line if axes.get_visible()], panel)
     return figure
+
+
+def _span(recordings: Sequence[RecordingCurves]) -> tuple[float, float]:
+    """The time that all of them take together; at least a second, if they are of one moment."""
+    begin = min(float(each.seconds[0]) for each in recordings)
+    end = max(float(each.seconds[-1]) for each in recordings)
+    return begin, end if end > begin else begin + 1.0
+
+
+def _draw_column(
+    below: Sequence[Axes],
+    panels: Sequence[Panel],
+    curves: RecordingCurves,
+    labels: Sequence[Event],
+    inches: float,
+) -> None:
+    """Draw the panels of one recording, each with the lines of its events."""
+    for panel, axes in zip(panels, below, strict=True):
+        _draw_panel(panel, axes, curves, inches)
+        for when, _, is_fault in labels:
+            axes.axvline(when, color=_color(is_fault), lw=0.6, alpha=0.7, zorder=0.6)
+    *_, last = (axes for axes in below if axes.get_visible())
+    last.set_xlabel("time, s", fontsize=9)
+    last.tick_params(labelbottom=True)
 
 
 class Panel(NamedTuple):
