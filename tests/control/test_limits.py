@@ -319,6 +319,18 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen(caplog: pytest.
     assert not limits.apply(image)
 
 
+@pytest.mark.parametrize(
+    ("position", "is_proven"), [(217, False), (218, True), (220, True), (222, True), (223, False)]
+)
+def test_an_axis_at_rest_within_two_counts_of_its_limit_proves_it(position: int, is_proven: bool) -> None:
+    limits, image = Limits(), BEFORE.with_positions({S: 255})
+    assert limits.learn(BEFORE, image, status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=130))
+    limits.limited[S] = 220
+    limits.note_rest(S, status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=position))
+    limits.note_other_client(0.0)
+    assert bool(limits.apply(image)) is is_proven
+
+
 @pytest.mark.parametrize(("asked", "limit"), [(255, 220), (0, 20)])
 def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int, limit: int) -> None:
     limits, beyond, at = Limits(), BEFORE.with_positions({S: asked}), BEFORE.with_positions({S: limit})
