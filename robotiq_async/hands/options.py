@@ -32,14 +32,15 @@ from ..values.stroke import Points, check_points
 class Usual(float):
     """A default that stands for the 3-Finger; a jaw has another.
 
-    The same figure given on purpose is a plain float, and is kept for any model.
+    The same figure given on purpose is a plain float, and is kept for any model. With None, the signature,
+    ``help()`` and the command line would show no figure.
     """
 
     __slots__ = ()
 
 
 class NoAddress(str):
-    """The address of a hand that was given none. The same text given on purpose is a plain str."""
+    """The address of a hand without one. The same text given on purpose is a plain str, without a warning."""
 
     __slots__ = ()
 
