@@ -78,3 +78,34 @@ def test_a_run_comes_to_its_end_from_every_state_and_never_back_from_there() -> 
     assert all(RunState.OVER in after for state, after in _NEXT.items() if state is not RunState.OVER)
     assert _NEXT[RunState.ENDING] == {RunState.OVER}
     assert not _NEXT[RunState.OVER]
+
+
+WHOLE_ALONE = {
+    "Axis": "by its table; a mechanism moves the other",
+    "Connection": "over TCP; the other is a serial line",
+    "ConnectionLostError": "callers catch it; the other says that no answer came",
+}
+"""Bases in another file that have one subclass, and that are used without it: each with both uses."""
+
+
+def test_no_class_is_cut_over_two_files_by_inheritance() -> None:
+    """A base for one subclass is a part of it: it has the other one, or both are in one file."""
+    modules = {path: ast.parse(path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py")}
+    classes = [
+        (each, path)
+        for path, module in modules.items()
+        for each in module.body
+        if isinstance(each, ast.ClassDef)
+    ]
+    home = {each.name: path for each, path in classes}
+    heirs: dict[str, set[Path]] = {}
+    count: dict[str, int] = {}
+    for each, path in classes:
+        for base in each.bases:
+            name = ast.unparse(base).partition("[")[0].rpartition(".")[2]
+            heirs.setdefault(name, set()).add(path)
+            count[name] = count.get(name, 0) + 1
+    cut = {
+        name for name, paths in heirs.items() if count[name] == 1 and name in home and {home[name]} != paths
+    }
+    assert cut == WHOLE_ALONE.keys()
