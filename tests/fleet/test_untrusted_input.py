@@ -113,9 +113,9 @@ async def test_a_command_without_its_argument_is_refused_before_it_is_a_job(
     here: Lab, hand: RemoteHand, name: str, missing: str
 ) -> None:
     """It raised in its task: then it was a job of the lease, in the words of Python about a function."""
-    assert hand._session is not None
+    assert hand._remote.session is not None
     fingers = {} if name == "command" else {"fingers": 1}
-    call = hand._session.dialog.call(fingers)
+    call = hand._remote.session.dialog.call(fingers)
     answer = await here.answer(f"cmd/{name}", call.pack())
     assert answer.begun is False
     with pytest.raises(TypeError, match=f"^{name} needs {missing}$"):
