@@ -155,10 +155,10 @@ async def test_a_command_that_is_refused_changes_no_grip(
     await hand.set_force(200)
     await hand.release(keep_grip=True)
     async with here.client("other") as other:
-        assert other._session is not None
+        assert other._remote.session is not None
         arguments = {"position": 90, "fingers": 1, "timeout": timeout}
         with pytest.raises((TypeError, ValueError), match="timeout"):
-            await other._session.dialog.ask("cmd/move", arguments, timeout=1.0)
+            await other._remote.session.dialog.ask("cmd/move", arguments, timeout=1.0)
         await other.set_speed(3, Finger.B)
         await asyncio.sleep(0.5)
         axes = Request.from_registers(here.gripper.request_registers).axes
