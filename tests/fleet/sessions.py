@@ -87,8 +87,8 @@ class Line:
         self.stack.push_async_callback(bus.close)
         return bus
 
-    async def agent_bus(self, keys: Path | None = None) -> ZenohBus:
-        return await self.open(agent_configuration("lab", "cell", ["left"], [self.endpoint], keys=keys))
+    async def agent_bus(self, keys: Path | None = None, *grippers: str) -> ZenohBus:
+        return await self.open(agent_configuration("lab", "cell", grippers, [self.endpoint], keys=keys))
 
     async def answering(self, keys: Path) -> Answering:
         """The agent's side."""
@@ -112,7 +112,7 @@ class Line:
 
     async def serve(self, hand: RobotiqHand, keys: Path | None = None) -> None:
         """An agent that serves a hand as zenoh://lab/cell/left."""
-        await self.serve_over(await self.agent_bus(keys), hand)
+        await self.serve_over(await self.agent_bus(keys, "left"), hand)
 
     async def serve_over(self, bus: ZenohBus, hand: RobotiqHand) -> None:
         served = Agent("lab", "cell", {"left": hand}, bus)

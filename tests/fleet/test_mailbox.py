@@ -199,6 +199,21 @@ def test_a_client_that_does_not_read_delays_no_other_and_excess_replies_are_drop
     assert threading.current_thread() not in dropped_in
 
 
+def test_the_first_reply_goes_out_at_once_and_those_of_a_pause_together() -> None:
+    """Each time that the thread woke, the loop waited for the interpreter."""
+    pause, first, times = patience(1.0), threading.Event(), list[float]()
+    reply_sender = ReplySender(pause)
+    began = time.monotonic()
+    reply_sender.put(first.set, lambda: None)
+    assert first.wait(pause / 2)
+    for _ in range(10):
+        reply_sender.put(lambda: times.append(time.monotonic()), lambda: None)
+    reply_sender.close()
+    reply_sender.join(patience(PATIENCE_S))
+    assert len(times) == 10
+    assert min(times) >= began + pause
+
+
 def test_an_unused_sender_ends_at_once() -> None:
     reply_sender = ReplySender()
     reply_sender.close()

@@ -446,7 +446,7 @@ async def test_a_flood_of_questions_is_dropped_at_its_connection() -> None:
 
         for client in (flooder, other):
             await wait_for_answer(client)
-        sent, took = 500, 1.0
+        sent, took = 500, float("inf")
         while took > sent / QUESTIONS_HZ / 2:  # the machine is too busy for a flood
             read.clear()
             begun = now()

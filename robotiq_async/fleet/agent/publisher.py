@@ -49,6 +49,7 @@ class HandPublisher:
         self._events: deque[Fields] = deque(maxlen=KEPT)
         self._count = 0
         self._sent_at = 0.0
+        self._statistics = hand.statistics.as_dict()  # of the last summary: they are most of its work
 
     def note_problem(self, why: str) -> None:
         """The gripper cannot be reached, for this reason; empty if it can."""
@@ -98,6 +99,7 @@ class HandPublisher:
         ).pack()
 
     def send_summary(self) -> None:
+        self._statistics = self._hand.statistics.as_dict()
         self._send_summary(json.dumps(self.summary()).encode())
 
     def summary(self) -> Fields:
@@ -116,7 +118,7 @@ class HandPublisher:
             "is_moving": self._is_moving(),
             "holder": None if holder is None else holder.label,
             "problem": self.problem,
-            "statistics": self._hand.statistics.as_dict(),
+            "statistics": self._statistics,
         }
 
     def _head(self) -> dict[str, Any]:

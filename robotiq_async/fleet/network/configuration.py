@@ -20,9 +20,9 @@ UNKNOWN: Final = 1000
 UNKNOWN_MS: Final = 5000  # time in ms after which such connections are closed; zenoh's default is 10 s
 LINK_LEASE_MS: Final = 1000
 """Time in ms after which a frozen or unplugged peer is detected; zenoh's default is 10 s."""
-QUESTIONS_HZ: Final = 500.0
+QUESTIONS_HZ: Final = 200.0
 """Questions a second about one gripper that zenoh lets in from one connection: nobody asks again within
-2 ms who waits for the answers."""
+5 ms who waits for the answers."""
 
 
 def agent_configuration(

@@ -128,7 +128,7 @@ class ReplySender:
     """
 
     def __init__(self, pause: float = 0.0) -> None:
-        """``pause`` is in seconds: replies of so long a time go out together.
+        """``pause`` is in seconds: replies of so long a time go out together, after the first.
 
         Each time that the thread wakes, the event loop may wait for the interpreter. On a busy machine that
         lasts as long as the thread is kept from the processor.
@@ -155,6 +155,6 @@ class ReplySender:
 
     def _run(self) -> None:
         while (send := self._waiting.get()) is not None:
+            send()
             if self._pause and self._waiting.empty():
                 time.sleep(self._pause)
-            send()

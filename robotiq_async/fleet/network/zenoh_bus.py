@@ -33,7 +33,7 @@ from .mailbox import Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
 LAST_ANSWERS_S: Final = 0.2  # seconds to send the answers to requests that are cancelled at the end
-DROP_EVERY_S: Final = 0.02  # seconds from one report of dropped requests to the next
+TOGETHER_S: Final = 0.02  # seconds from one report of dropped requests, or answer to a question, to the next
 LONGEST_REQUEST: Final = 4096  # bytes of a request; a longer one is dropped unread
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
@@ -95,10 +95,10 @@ class ZenohBus:
         self._mailbox = Mailbox()
         # A sender for each kind: clients that do not read their answers delay only answers of that kind.
         self._repliers = {
-            kind: ReplySender()
+            kind: ReplySender(pause=TOGETHER_S if kind is MessageKind.QUESTION else 0.0)
             for kind in (MessageKind.HALT, MessageKind.REQUEST, MessageKind.OTHERS, MessageKind.QUESTION)
         }
-        self._dropping = ReplySender(pause=DROP_EVERY_S)
+        self._dropping = ReplySender(pause=TOGETHER_S)
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
