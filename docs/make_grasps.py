@@ -145,7 +145,7 @@ class Stage:
 
     def picture(self, size: int) -> Image.Image:
         """Seen from the side, a little from above."""
-        world: Any = self.physics._world  # noqa: SLF001
+        world: Any = self.physics._mechanism.world  # noqa: SLF001
         model, data = world._model, world._data  # noqa: SLF001
         palm = data.body(f"gripper/{hand_model(self.model).root}").xpos
         camera = mujoco.MjvCamera()

@@ -30,13 +30,14 @@ def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> Simulate
     because a later import would block the running loop.
     """
     from ..simulator import Physics, SimulatedGripper  # noqa: PLC0415
+    from ..simulator.physics.driven_axis import mechanism_of  # noqa: PLC0415
 
     scene = simulation.physics
     # Another thread steps it: the loop must not wait.
     physics = None if scene is None else Physics(scene, threaded=True)
     gripper = SimulatedGripper(speedup=simulation.speedup, model=model, physics=physics)
     if physics is not None:
-        physics.stop()  # a server starts it: a hand that is never opened has no thread
+        mechanism_of(physics).stop()  # a server starts it: a hand that is never opened has no thread
     if simulation.object is not None:
         gripper.place_object(Finger.ABC, simulation.object)
     return gripper

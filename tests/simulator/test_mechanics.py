@@ -21,7 +21,7 @@ from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
 from robotiq_async.calibration.scales import SpeedCalibration
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
 from robotiq_async.simulator.mechanics.stepper import OrderedDrive
-from robotiq_async.simulator.physics.driven_axis import Way
+from robotiq_async.simulator.physics.driven_axis import Way, mechanism_of
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from tests.patience import patience
@@ -356,8 +356,7 @@ def test_fingers_wrap_around_a_rod_at_the_palm_and_pinch_one_at_the_tips() -> No
 def test_a_finger_that_is_stopped_early_bends_earlier_than_a_free_one() -> None:
     bench = active("rod:70x140,0.3@110", THREE_FINGER)
     bench.move(255)
-    world = bench.physics._world
-    assert world is not None
+    world = bench.physics._mechanism.world
     base, middle = (
         float(world._data.joint(f"gripper/finger_middle_joint_{number}").qpos[0]) for number in (1, 2)
     )
@@ -450,7 +449,7 @@ def test_a_gripper_does_not_wait_for_its_thread_and_moves_until_that_has_its_ord
     gripper = SimulatedGripper(model=TWO_FINGER_85, physics=physics, speedup=10)
     gripper.write(0, [0x0100, 0, 0])
     until(lambda: bool(gripper.status_registers()[0] & 0x3000 == 0x3000))
-    physics._lock.acquire()  # the thread stands still in a step
+    physics._mechanism.lock.acquire()  # the thread stands still in a step
     try:
         asked = threading.Thread(target=lambda: gripper.write(0, [0x0900, 255, 0xFFFF]), daemon=True)
         asked.start()
@@ -463,7 +462,7 @@ def test_a_gripper_does_not_wait_for_its_thread_and_moves_until_that_has_its_ord
         assert gripper.position(JAW) == before
         assert gripper.bodies is not None
     finally:
-        physics._lock.release()
+        physics._mechanism.lock.release()
     until(lambda: not gripper.is_moving)
     assert gripper.holds == JAW
 
@@ -472,7 +471,7 @@ def test_what_a_motor_tells_before_it_has_its_order_is_not_the_end_of_the_new_mo
     """The thread may make a step between the order and its being taken up."""
     bench, orders = active("table"), deque[Callable[[], None]]()
     bench.move(0)
-    motor = bench.physics.drive(JAW)
+    motor = mechanism_of(bench.physics).drive(JAW)
     told = OrderedDrive(motor, orders)
     assert told.outcome is motor.outcome is ObjectStatus.AT_POSITION
     told.go(200.0, Way(100.0), 255, clears=False)

@@ -18,7 +18,7 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import RobotiqHand, sync
 from robotiq_async.simulator import Physics, PhysicsError, SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.physics.driven_axis import Way
+from robotiq_async.simulator.physics.driven_axis import Way, mechanism_of
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.errors import RobotiqConnectionError
 from robotiq_async.values.model import TWO_FINGER_85
@@ -69,12 +69,12 @@ def test_bodies_stand_still_after_its_end_until_it_begins_again() -> None:
         until(lambda: activated(gripper))
         gripper.write(0, [0x0900, 255, 0])  # 4 s of slow closing, in 0.4 s
         until(lambda: gripper.position(JAW) > 20)
-        physics.stop()
+        mechanism_of(physics).stop()
         stopped_at = gripper.position(JAW)
         time.sleep(0.1)
         assert gripper.position(JAW) == stopped_at
         assert not threads(), "a read does not start it"
-        physics.start()
+        mechanism_of(physics).start()
         until(lambda: not gripper.is_moving)
         assert gripper.holds == JAW
 
@@ -82,9 +82,9 @@ def test_bodies_stand_still_after_its_end_until_it_begins_again() -> None:
 def test_without_a_thread_start_and_stop_do_nothing() -> None:
     physics = Physics(BOX)
     SimulatedGripper(lambda: 0.0, model=TWO_FINGER_85, physics=physics)
-    physics.start()
+    mechanism_of(physics).start()
     assert not threads()
-    physics.stop()
+    mechanism_of(physics).stop()
 
 
 def test_one_that_was_dropped_ends_although_nobody_stopped_it() -> None:
@@ -139,7 +139,7 @@ def test_an_order_that_cannot_be_carried_out_is_raised_by_the_next_call() -> Non
     physics, gripper = threaded()
     with physics:
         gripper.status_registers()
-        physics.drive(JAW).go(cast("Any", "far away"), Way(100.0), 255, clears=False)
+        mechanism_of(physics).drive(JAW).go(cast("Any", "far away"), Way(100.0), 255, clears=False)
         until(lambda: not threads())
         for call in (
             gripper.status_registers,

@@ -129,6 +129,18 @@ class Mechanism(Protocol):
         """Places of joints and parts."""
 
 
+class HasMechanism(Protocol):
+    """A :class:`Physics`, as its gripper knows it."""
+
+    @property
+    def _mechanism(self) -> Mechanism: ...
+
+
+def mechanism_of(physics: HasMechanism) -> Mechanism:
+    """The mechanism of a physics, for its gripper and the servers of that; programs call the physics."""
+    return physics._mechanism  # noqa: SLF001  # not shown to programs
+
+
 class DrivenAxis(Axis):
     """An axis without a plan: it waits for the reports of its drive.
 

@@ -18,7 +18,7 @@ from robotiq_async.values.request import Request
 from .axis import Axis, Obstacle
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_ends, check_scissor_limit
 from .controller import GripperController
-from .driven_axis import PhysicsError
+from .driven_axis import PhysicsError, mechanism_of
 from .habits import Habits
 from .inbox import HeardWrite, Inbox
 from .spread import SEED
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robotiq_async.calibration.motion_profile import MotionProfile
 
     from .bodies import Bodies
-    from .driven_axis import Mechanism
+    from .driven_axis import HasMechanism, Mechanism
 
 _FOREVER_S: Final = 1e9
 _CYCLE: Final = 0.005
@@ -75,7 +75,7 @@ class SimulatedGripper:
         seed: int = SEED,
         habits: Habits | None = None,
         model: Model | str | None = None,
-        physics: Mechanism | None = None,
+        physics: HasMechanism | None = None,
         motion: MotionProfile | None = None,
         ends: tuple[int, int] | None = None,
     ) -> None:
@@ -114,11 +114,12 @@ class SimulatedGripper:
         cycle = (_CYCLE if kind.has_modes else 0.0) if device_cycle is None else device_cycle
         self._cycle = check_seconds("device_cycle", cycle, 0, _FOREVER_S)
         self._physics = physics
-        if physics is not None:
-            physics.attach(kind, clock, self._speedup)
+        self._mechanism = mechanism = None if physics is None else mechanism_of(physics)
+        if mechanism is not None:
+            mechanism.attach(kind, clock, self._speedup)
         ends = None if ends is None else check_ends(ends)
         self._controller = GripperController(
-            kind, limit, seed_or_none, habits or Habits(), physics, motion, ends
+            kind, limit, seed_or_none, habits or Habits(), mechanism, motion, ends
         )
         self._time = 0.0
         self._clock = clock
@@ -373,18 +374,18 @@ class SimulatedGripper:
     # Bodies.
 
     @property
-    def physics(self) -> Mechanism | None:
-        """The drive of its axes; None for straight lines in time."""
+    def physics(self) -> HasMechanism | None:
+        """The :class:`Physics` that moves its axes; None for straight lines in time."""
         return self._physics
 
     @property
     def bodies(self) -> Bodies | None:
         """Places of joints and parts, for a drawing; None without physics, and after an error in it."""
-        if self._physics is None:
+        if self._mechanism is None:
             return None
         try:
             self._catch_up()
-            return self._physics.bodies()
+            return self._mechanism.bodies()
         except PhysicsError:
             return None
 
@@ -510,8 +511,8 @@ class SimulatedGripper:
         pending = self._inbox.pending
         while True:
             effect = pending[0][0] if pending else math.inf
-            if self._physics is not None:
-                self._let_move(self._physics, min(now, effect, self._controller.next_event))
+            if self._mechanism is not None:
+                self._let_move(self._mechanism, min(now, effect, self._controller.next_event))
             event = self._controller.next_event
             if event > now and effect > now:
                 break
@@ -521,11 +522,11 @@ class SimulatedGripper:
                 self._controller.apply(*pending.popleft())
         self._time = now
 
-    def _let_move(self, physics: Mechanism, until: float) -> None:
+    def _let_move(self, mechanism: Mechanism, until: float) -> None:
         """Let the bodies move until a time, or until an axis has something to report."""
         axes = self._controller.driven
-        while physics.step(until):
-            time = self._time = max(self._time, physics.time)
+        while mechanism.step(until):
+            time = self._time = max(self._time, mechanism.time)
             reports = [axis.observe(time) for axis in axes]
             if any(reports):
                 return

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self, cast
 from robotiq_async.runtime.concurrency import in_a_thread, wait_shielded
 from robotiq_async.values.model import THREE_FINGER
 
+from ..physics.driven_axis import mechanism_of
 from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
     from types import TracebackType
 
-    from ..physics.driven_axis import PhysicsError
+    from ..physics.driven_axis import Mechanism, PhysicsError
     from ..troubles.trouble import TroubleLink
     from .connection import Connection
     from .responder import Responder
@@ -90,6 +91,12 @@ class SimulatorEndpoint(ABC):
         model = self.gripper.model
         return "" if model is THREE_FINGER else f"?model={model.name}"
 
+    @property
+    def _mechanism(self) -> Mechanism | None:
+        """The bodies of this gripper, which move while a server of it runs."""
+        physics = self.gripper.physics
+        return None if physics is None else mechanism_of(physics)
+
     async def start(self) -> None:
         """Begin to answer.
 
@@ -100,8 +107,8 @@ class SimulatorEndpoint(ABC):
         if self._is_running:
             raise RuntimeError(f"{type(self).__name__} is running already, at {self.address}")
         await self._open()
-        if self.gripper.physics is not None:
-            self.gripper.physics.start()
+        if self._mechanism is not None:
+            self._mechanism.start()
         self._responder.open()
         self._is_running = True
 
@@ -115,8 +122,8 @@ class SimulatorEndpoint(ABC):
         self._is_running = False
         self._close()
         self._responder.close()
-        physics = self.gripper.physics
-        ending = in_a_thread(physics.stop) if physics is not None and physics.threaded else None
+        mechanism = self._mechanism
+        ending = in_a_thread(mechanism.stop) if mechanism is not None and mechanism.threaded else None
         # Two turns of the loop, in which transports close their files.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
