@@ -247,7 +247,7 @@ def models() -> str:
             [
                 each.title,
                 f"`{each.name}`",
-                each.axes_text,
+                ", ".join(each.names),
                 f"{each.stroke.mm:g} mm",
                 "{:g}-{:g} mm/s".format(*each.speeds_mm_s),
                 "{:g}-{:g} N".format(*each.forces_n),

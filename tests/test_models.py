@@ -45,6 +45,7 @@ from robotiq_async.tools.recording.table import COLUMNS, Table
 from robotiq_async.tools.web.page.mirror import HandMirror
 from robotiq_async.tools.web.page.widgets.words import axis_title, opening_words
 from robotiq_async.values.checks import parse_fingers
+from robotiq_async.values.contradictions import contradiction
 from robotiq_async.values.errors import RobotiqStateError
 from robotiq_async.values.model import MODELS, model_of
 from robotiq_async.values.request import AxisRequest, Request
@@ -364,7 +365,7 @@ async def test_a_gripper_with_a_reserved_bit_is_refused_at_first_and_stopped_lat
 @pytest.mark.parametrize("model", MODELS.values(), ids=lambda model: model.name)
 def test_zeros_contradict_no_model(model: Model) -> None:
     """A gateway may send them before its gripper has answered."""
-    assert not model.contradiction((0,) * 8)
+    assert not contradiction(model, (0,) * 8)
 
 
 # -- a hand ------------------------------------------------------------------------------------------------

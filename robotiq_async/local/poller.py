@@ -18,9 +18,9 @@ from ..hands.statistics import Counters
 from ..link.transport import CyclicLink, Link, SharedLink
 from ..runtime.limit import HELD_S
 from ..runtime.tick import Tick
+from ..values.contradictions import contradiction, names_that_fit, why_stranger, wrong_axes
 from ..values.errors import ProtocolError, RobotiqConnectionError, WrongModelError
 from ..values.events import SentRequest
-from ..values.model import names_that_fit, why_stranger
 from ..values.registers import Registers
 from ..values.request import Request
 from ..values.status import RobotiqStatus
@@ -275,8 +275,8 @@ class Poller:
         Reserved bits alone do not prove that this is another gripper than before. It may be in motion, so it
         must get its stop.
         """
-        if shown := self._model.contradiction(registers):
-            if self._accepted is None or self._model.wrong_axes(registers):
+        if shown := contradiction(self._model, registers):
+            if self._accepted is None or wrong_axes(self._model, registers):
                 await self._link.close()  # a stop would be written to a link that is open
                 raise self._not_this_gripper(registers, shown)
             if shown != self._accepted:

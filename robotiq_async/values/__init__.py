@@ -13,6 +13,7 @@ from .checks import (
     repr_of,
     single,
 )
+from .contradictions import contradiction, names_that_fit, why_stranger
 from .enums import (
     CLOSED,
     DEFAULT_FORCE,
@@ -67,8 +68,6 @@ from .model import (
     TWO_FINGER_140,
     Model,
     model_of,
-    names_that_fit,
-    why_stranger,
 )
 from .move_result import MoveResult
 from .registers import RTU_REGISTERS, TCP_REGISTERS, Echo, RegisterMap, Registers
@@ -92,7 +91,7 @@ __all__ += ["SentRequest", "Transition"]
 __all__ += ["GraspResult", "GripChange", "GripEvent"]
 __all__ += ["LONGEST_REASON", "Inhibit"]
 __all__ += ["HAND_E", "MODELS", "THREE_FINGER", "TWO_FINGER_85", "TWO_FINGER_140", "Model", "model_of"]
-__all__ += ["names_that_fit", "why_stranger"]
+__all__ += ["contradiction", "names_that_fit", "why_stranger"]
 __all__ += ["MoveResult"]
 __all__ += ["RTU_REGISTERS", "TCP_REGISTERS", "Echo", "RegisterMap", "Registers"]
 __all__ += ["AxisRequest", "Request"]

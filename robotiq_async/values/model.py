@@ -13,23 +13,12 @@ from typing import Final
 
 from . import registers as reg
 from .checks import check_axis, check_int, check_mask, repr_of
-from .enums import Fault, Finger, ObjectStatus, names_of
-from .registers import Field, RegisterMap, Registers
+from .enums import Fault, Finger, names_of
+from .registers import Field, RegisterMap
 from .stroke import Stroke
 
 TOLERANCE: Final = 2
 """Counts between a request and the position reached (manual: within 1-2)."""
-
-
-def _masks(
-    fields: tuple[Field, ...], axes: tuple[Finger, ...], wanted: set[ObjectStatus]
-) -> tuple[Finger, ...]:
-    """For each value of the byte with the object status: the axes in one of the wanted states."""
-    # With numbers: every program waits for this at its import, and an enumeration takes 1 us for each.
-    of_axes = [(int(axis), field.shift) for axis, field in zip(axes, fields, strict=True)]
-    masks = [sum(axis for axis, shift in of_axes if byte >> shift & 3 in wanted) for byte in range(256)]
-    of = {mask: Finger(mask) for mask in set(masks)}
-    return tuple(of[mask] for mask in masks)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -52,12 +41,7 @@ class Model:
         forces_n: nominal forces at the values 0 and 255.
         has_modes: whether it has grasping modes, and request bits that choose individual control.
         all_axes: its axes, as a mask.
-        object_shift: of the byte with the object status, in register 0.
-        moving: for each value of that byte, the axes that move.
-        contacts: the same for the axes that a contact stopped.
-        holding: the same for the fingers that a contact stopped while closing.
         names: of the axes.
-        contact_names: of the axes in ``contacts``.
     """
 
     name: str
@@ -76,48 +60,17 @@ class Model:
     has_modes: bool = False
     # Worked out once: statuses are decoded at every poll.
     all_axes: Finger = field(init=False)
-    moving: tuple[Finger, ...] = field(init=False)
-    contacts: tuple[Finger, ...] = field(init=False)
-    holding: tuple[Finger, ...] = field(init=False)
     names: tuple[str, ...] = field(init=False)
-    contact_names: tuple[tuple[str, ...], ...] = field(init=False)
-    _index: dict[Finger, int] = field(init=False)
-    object_shift: int = field(init=False)
 
     def __post_init__(self) -> None:
-        keep = object.__setattr__
-        contact = {what for what in ObjectStatus if what.is_contact}
-        keep(self, "all_axes", Finger(sum(self.axes)))
-        keep(self, "moving", _masks(self.object_status, self.axes, {ObjectStatus.IN_MOTION}))
-        keep(self, "contacts", _masks(self.object_status, self.axes, contact))
-        closing = _masks(self.object_status, self.axes, {ObjectStatus.CONTACT_CLOSING})
-        keep(self, "holding", tuple(axes & Finger.ABC for axes in closing))
-        keep(self, "names", tuple(names_of(self.all_axes)))
-        names = {axes: tuple(names_of(axes)) for axes in set(self.contacts)}
-        keep(self, "contact_names", tuple(names[axes] for axes in self.contacts))
-        keep(self, "_index", {axis: index for index, axis in enumerate(self.axes)})
-        keep(self, "object_shift", 0 if self.object_status[0].byte else 8)
+        object.__setattr__(self, "all_axes", Finger(sum(self.axes)))
+        object.__setattr__(self, "names", tuple(names_of(self.all_axes)))
 
     def __repr__(self) -> str:
         return self.title
 
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return model_of, (self.name,)
-
-    def index(self, finger: object) -> int:
-        """The place of one axis among the registers.
-
-        Raises:
-            TypeError: not a Finger or an int.
-            ValueError: not exactly one axis, or one that the model does not have.
-        """
-        index = self._index.get(finger) if type(finger) is Finger else None
-        if index is None:
-            axis = check_axis(finger)
-            index = self._index.get(axis)
-            if index is None:
-                raise ValueError(f"finger must be an axis of a {self.title} ({self.axes_text}), got {axis}")
-        return index
 
     def fault(self, code: object) -> Fault:
         """The fault of a code.
@@ -139,7 +92,9 @@ class Model:
         if mask in (Finger.ABC, Finger.ALL):
             return mask & self.all_axes
         if missing := mask & ~self.all_axes:
-            raise ValueError(f"fingers must be axes of a {self.title} ({self.axes_text}), got {missing}")
+            raise ValueError(
+                f"fingers must be axes of a {self.title} ({', '.join(self.names)}), got {missing}"
+            )
         return mask
 
     def has_reached(self, request: int, position: int) -> bool:
@@ -150,36 +105,6 @@ class Model:
         if request <= self.open_reading_max:
             return request < position <= self.open_reading_max + TOLERANCE
         return request > position >= self.closed_reading_min - TOLERANCE
-
-    def contradiction(self, registers: Registers) -> str:
-        """The status registers that this model cannot have, as a text; empty without a contradiction.
-
-        They are found by :meth:`wrong_axes`, or set reserved bits, which are 0.
-        """
-        if wrong := self.wrong_axes(registers):
-            return wrong
-        if any(field.read(registers) for field in reg.status_reserved(self.has_modes)):
-            return "bits that are always 0 in it"
-        return ""
-
-    def wrong_axes(self, registers: Registers) -> str:
-        """The status registers that only a model with other axes has, as a text; empty if there are none.
-
-        A sibling leaves byte 1 and bytes 6 to 14 at 0. On a 3-Finger the positions of B, C and the scissor
-        lie there, which are never 0 together. All zeros prove nothing: a gateway may send them before its
-        gripper answers.
-        """
-        has_one = not registers[0] & 0xFF and not any(registers[3:7]) and not registers[7] >> 8
-        if has_one and len(self.axes) > 1 and registers[2] >> 8:
-            return "one axis alone, as a 2F or a Hand-E: bytes 1 and 6 to 14 are 0"
-        if not has_one and len(self.axes) == 1:
-            return "more than one axis, as a 3-Finger: bytes 1 and 6 to 14 are not all 0"
-        return ""
-
-    @property
-    def axes_text(self) -> str:
-        """The names of its axes, for messages."""
-        return ", ".join(self.names)
 
 
 THREE_FINGER: Final = Model(
@@ -270,15 +195,14 @@ def model_of(value: object, name: str = "model") -> Model:
     return MODELS[value.lower()]
 
 
-def why_stranger(registers: Registers) -> str:
-    """The reason why status registers fit no model; empty if they may fit one."""
-    if not all(model.contradiction(registers) for model in MODELS.values()):
-        return ""
-    words = " ".join(f"{word:04X}" for word in registers)
-    return f"its registers {words} have bits set that are 0 in a gripper"
+def index_of(model: Model, finger: object) -> int:
+    """The place of one axis among the registers of a model.
 
-
-def names_that_fit(registers: Registers) -> str:
-    """Advice to name a model that status registers do not contradict, for messages."""
-    fitting = [model.name for model in MODELS.values() if not model.contradiction(registers)]
-    return f"name its model: {' or '.join(f'?model={name}' for name in fitting)} at the end of the address"
+    Raises:
+        TypeError: not a Finger or an int.
+        ValueError: not exactly one axis, or one that the model does not have.
+    """
+    axis = finger if type(finger) is Finger and finger in model.axes else check_axis(finger)
+    if axis not in model.axes:
+        raise ValueError(f"finger must be an axis of a {model.title} ({', '.join(model.names)}), got {axis}")
+    return model.axes.index(axis)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from . import registers as reg
 from .enums import Finger, Mode
-from .model import THREE_FINGER, Model
+from .model import THREE_FINGER, Model, index_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class Request:
 
     def position(self, axis: Finger) -> int:
         """The position request of one axis."""
-        return self.axes[self.model.index(axis)].position
+        return self.axes[index_of(self.model, axis)].position
 
     def with_positions(self, positions: Mapping[Finger, int]) -> Request:
         """The same image with other position requests for some axes."""

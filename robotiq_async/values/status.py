@@ -10,7 +10,8 @@ from typing import Any, Final
 from . import registers as reg
 from .checks import check_flag, check_int, check_seconds
 from .enums import CONTROLLER_FAULTS, Fault, Finger, Initialization, Mode, ObjectStatus
-from .model import THREE_FINGER, TOLERANCE, Model, model_of
+from .model import THREE_FINGER, TOLERANCE, Model, index_of, model_of
+from .object_byte import object_byte_of
 from .stroke import Stroke
 
 NO_REQUEST: Final = "NO_REQUEST"
@@ -150,7 +151,7 @@ class RobotiqStatus:
             ValueError: not exactly one axis.
         """
         model = self._model
-        return _OBJECT_STATUSES[model.object_status[model.index(finger)].read(self._registers)]
+        return _OBJECT_STATUSES[model.object_status[index_of(model, finger)].read(self._registers)]
 
     def axis_state(self, finger: Finger | int) -> str:
         """The state of an axis in one word, for people and files: the name of its :meth:`finger_status`.
@@ -166,7 +167,7 @@ class RobotiqStatus:
 
     def position(self, finger: Finger | int) -> int:
         """Position in counts, 0..255 (gPO). Open reads 6-7 on a 3-Finger, closed 240 or more."""
-        return reg.gPO[self._model.index(finger)].read(self._registers)
+        return reg.gPO[index_of(self._model, finger)].read(self._registers)
 
     def opening_mm(self, finger: Finger | int) -> float:
         """The opening at a finger, in millimetres: nominal, unless the hand was made with measured points.
@@ -214,11 +215,11 @@ class RobotiqStatus:
 
     def requested_position(self, finger: Finger | int) -> int:
         """Echo of the position request, 0..255 (gPR)."""
-        return reg.gPR[self._model.index(finger)].read(self._registers)
+        return reg.gPR[index_of(self._model, finger)].read(self._registers)
 
     def current(self, finger: Finger | int) -> int | None:
         """Motor current in counts, 0..255 (gCU); None where the link does not carry it."""
-        index = self._model.index(finger)
+        index = index_of(self._model, finger)
         return reg.gCU[index].read(self._registers) if self._has_current else None
 
     def current_ma(self, finger: Finger | int) -> int | None:
@@ -319,9 +320,9 @@ class RobotiqStatus:
     @property
     def moving(self) -> Finger:
         """The axes that move; may be empty."""
-        model = self._model
-        shown = self._registers[0] >> model.object_shift & 0xFF
-        return model.moving[shown] if self._is_under_request else Finger(0)
+        byte = object_byte_of(self._model)
+        shown = self._registers[0] >> byte.shift & 0xFF
+        return byte.moving[shown] if self._is_under_request else Finger(0)
 
     @property
     def _is_under_request(self) -> bool:
@@ -335,8 +336,8 @@ class RobotiqStatus:
     @property
     def contacts(self) -> Finger:
         """The axes stopped by a contact; may be empty."""
-        model = self._model
-        return model.contacts[self._registers[0] >> model.object_shift & 0xFF]
+        byte = object_byte_of(self._model)
+        return byte.contacts[self._registers[0] >> byte.shift & 0xFF]
 
     @property
     def part(self) -> Part | None:
@@ -346,7 +347,8 @@ class RobotiqStatus:
         serious fault. It may never report one for a thin part. A contact latches: it stays when the part has
         been taken out, until a request moves the finger.
         """
-        holding = self._model.holding[self._registers[0] >> self._model.object_shift & 0xFF]
+        byte = object_byte_of(self._model)
+        holding = byte.holding[self._registers[0] >> byte.shift & 0xFF]
         if not holding or not self._is_under_request or self.fault.is_serious:
             return None
         jaw = len(self._model.axes) == 1
@@ -362,7 +364,7 @@ class RobotiqStatus:
         """
         # A recorder calls this at every poll: read registers and not the many properties.
         words, fault, states, model = self._registers, self.fault, self._states, self._model
-        scale = reg.MILLIAMPERE_PER_COUNT
+        scale, byte = reg.MILLIAMPERE_PER_COUNT, object_byte_of(model)
         axes: dict[str, dict[str, Any]] = {
             name: {
                 "position": reg.gPO[n].read(words),
@@ -390,7 +392,7 @@ class RobotiqStatus:
             "mode": self.mode.name,
             "activation_echo": self.activation_echo,
             "go_echo": self.go_echo,
-            "contacts": list(model.contact_names[words[0] >> model.object_shift & 0xFF]),
+            "contacts": list(byte.contact_names[words[0] >> byte.shift & 0xFF]),
             **axes,
         }
 

@@ -28,6 +28,7 @@ from robotiq_async import (
 from robotiq_async.link.address import Address, parse_address
 from robotiq_async.link.urcap import lines
 from robotiq_async.link.urcap.transport import UrcapTransport
+from robotiq_async.values.contradictions import contradiction
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
@@ -133,7 +134,7 @@ async def test_the_variables_become_the_registers_of_a_jaw() -> None:
     assert (shown.activation_echo, shown.go_echo, shown.is_activated) == (True, True, True)
     assert shown.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
     assert (shown.requested_position(JAW), shown.position(JAW), int(shown.fault)) == (255, 120, 9)
-    assert TWO_FINGER_85.contradiction(shown.registers) == ""
+    assert contradiction(TWO_FINGER_85, shown.registers) == ""
 
 
 async def test_a_poll_asks_for_what_moves_and_for_the_rest_in_turn() -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from robotiq_async.values import registers as reg
 from robotiq_async.values.checks import check_byte, check_int, check_number, check_seconds
 from robotiq_async.values.enums import NO_AXES, Fault, Finger
-from robotiq_async.values.model import Model, model_of
+from robotiq_async.values.model import Model, index_of, model_of
 from robotiq_async.values.request import Request
 
 from .axis import Axis, Obstacle
@@ -296,7 +296,7 @@ class SimulatedGripper:
             TypeError: duration is not a number.
             ValueError: duration is negative, or the model has no scissor.
         """
-        self._controller.model.index(Finger.SCISSOR)
+        index_of(self.model, Finger.SCISSOR)
         self.inject_fault(Fault.SCISSOR_INTERFERENCE, duration)
 
     @property
@@ -493,7 +493,7 @@ class SimulatedGripper:
         return tuple(self._inbox.writes)
 
     def _axis(self, finger: Finger | int) -> Axis:
-        index = self.model.index(finger)
+        index = index_of(self.model, finger)
         self._catch_up()
         return self._controller.axes[index]
 

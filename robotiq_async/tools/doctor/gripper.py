@@ -21,6 +21,7 @@ from ...values import (
     RobotiqConnectionError,
     RobotiqStatus,
     Severity,
+    contradiction,
     model_of,
     names_that_fit,
 )
@@ -76,9 +77,9 @@ def _advice_for_a_loss(address: Address, error: RobotiqConnectionError) -> str:
 
 def _check_model(model: Model, registers: Registers, report: ReportFinding) -> None:
     """Report registers that only another model can have."""
-    if not (why := model.contradiction(registers)):
+    if not (why := contradiction(model, registers)):
         if any(registers):  # a gateway may send zeros before its gripper answers
-            alike = [each.title for each in MODELS.values() if not each.contradiction(registers)]
+            alike = [each.title for each in MODELS.values() if not contradiction(each, registers)]
             rest = f"; the registers do not say which: taken as a {model.title}" if len(alike) > 1 else ""
             report(Finding(Level.GOOD, "model", f"a {' or a '.join(alike)}{rest}"))
         return

@@ -7,7 +7,7 @@ from typing import Final
 
 from ...hands import POLL_INTERVAL_S
 from ...link import registers_of
-from ...values import Fault, RobotiqStatus, names_that_fit, why_stranger
+from ...values import Fault, RobotiqStatus, contradiction, names_that_fit, why_stranger
 from ..doctor.answer import STRANGER, find_gripper
 from ..doctor.findings import Finding, GiveUpError
 from ..doctor.urcap import find_urcap
@@ -51,7 +51,7 @@ def why_no_gripper(status: RobotiqStatus) -> str:
         return "all registers read 0; the gripper behind the fieldbus may have no power"
     if why := why_stranger(status.registers):
         return why
-    if shown := status.model.contradiction(status.registers):
+    if shown := contradiction(status.model, status.registers):
         how = names_that_fit(status.registers)
         return f"this is no {status.model.title}: its registers show {shown}; {how}"
     if status.fault.name.startswith("UNKNOWN"):
