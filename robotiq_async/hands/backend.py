@@ -12,7 +12,7 @@ from ..runtime.concurrency import check_loop
 from ..runtime.logger import Log
 from ..values.checks import check_flag
 from ..values.enums import Finger, State, StopLevel, Trigger
-from ..values.errors import ConnectionLostError, InvalidStateError, NotStartedError
+from ..values.errors import ConnectionLostError, InvalidStateError, NotStartedError, of_hand
 from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
@@ -85,12 +85,12 @@ class Backend(ABC):
     @property
     @abstractmethod
     def newest_status(self) -> RobotiqStatus | None:
-        """The newest status; None before the first."""
+        """The newest status; None until there are some."""
 
     @property
     @abstractmethod
-    def statistics(self) -> Statistics:
-        """Figures of the polling since the last start."""
+    def statistics(self) -> Statistics | None:
+        """Figures of the polling since the last start; None until there are some."""
 
     @property
     def points(self) -> Points:
@@ -232,4 +232,4 @@ class Backend(ABC):
     def no_status_for(self, seconds: float) -> ConnectionLostError:
         """The error of a stream whose limit of time is over."""
         why = f"no status for {seconds:g} s (the hand is in {self.state.name})"
-        return ConnectionLostError(why).of_hand(self.name)
+        return of_hand(ConnectionLostError(why), self.name)

@@ -21,7 +21,7 @@ from .backend import Backend
 from .grip_watch import SLIP_COUNTS, GripWatch
 from .options import LONGEST_WAIT_S
 from .present_run import NamesErrors, refuse_copy, refuse_with
-from .statistics import Statistics
+from .statistics import Statistics, no_statistics
 from .streams import Stream, check_buffer, check_limit
 from .waiting import check_states
 
@@ -536,7 +536,7 @@ class Hand:
     @property
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
-        return self._backend.statistics
+        return self._backend.statistics or no_statistics()
 
     @describes_arguments()
     def statuses(self, buffer: int = 1, *, lost_after: float | None = None) -> Stream[RobotiqStatus]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import NoReturn, Protocol
 
-from ..values.errors import RobotiqError
+from ..values.errors import RobotiqError, of_hand
 
 
 class PresentRun(Protocol):
@@ -37,7 +37,7 @@ class NamesErrors:
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if self._name and isinstance(error, RobotiqError):
-            error.of_hand(self._name)
+            of_hand(error, self._name)
 
 
 def refuse_copy(hand: object) -> NoReturn:

@@ -76,10 +76,10 @@ class Statistics:
         """
         return cls(**{each.name: told[each.name] for each in fields(cls) if each.name in told})
 
-    @classmethod
-    def none(cls) -> Self:
-        """The figures before the first poll."""
-        return cls(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, "", 0, {})
+
+def no_statistics() -> Statistics:
+    """The figures before the first poll."""
+    return Statistics(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, "", 0, {})
 
 
 def percentile(ordered: list[float], share: float) -> float:

@@ -42,6 +42,7 @@ from ..values.errors import (
     NotActivatedError,
     NotStartedError,
     StateTimeoutError,
+    of_hand,
 )
 from ..values.inhibit import Inhibit
 from ..values.move_result import MoveResult
@@ -292,10 +293,10 @@ class LocalBackend(Backend):
         return self._machine.state
 
     @property
-    def statistics(self) -> Statistics:
+    def statistics(self) -> Statistics | None:
         """Figures of the polling since the last start."""
         if self.session is None:
-            return Statistics.none()
+            return None
         controller = self.session.controller
         return self.session.counters.snapshot(controller.foreign_commands, controller.evidence.passed)
 
@@ -314,7 +315,7 @@ class LocalBackend(Backend):
         why = self.session.link_lost()
         error = ConnectionLostError(f"no status for {seconds:g} s: {why.message}")
         error.__cause__ = why.__cause__
-        return error.of_hand(why.hand)
+        return of_hand(error, why.hand)
 
     def is_moving(self) -> bool:
         assert self.session is not None, "the hand runs"

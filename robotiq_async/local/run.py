@@ -45,6 +45,7 @@ from ..values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
     RobotiqError,
+    of_hand,
 )
 from .cycle import STOP
 from .ending import IN_FLIGHT_S, Ending
@@ -163,7 +164,7 @@ class Run:
         why = "" if down is None else f": {down.why} (down since {down.since})"
         error = ConnectionLostError(f"the link is down{why}")
         error.__cause__ = None if down is None else down.why
-        return error.of_hand(self._parts.options.given_name)
+        return of_hand(error, self._parts.options.given_name)
 
     def why_over(self) -> RobotiqError:
         """Make the error for everybody who waits for a run that is over."""

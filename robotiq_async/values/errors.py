@@ -29,13 +29,15 @@ Bad arguments raise ValueError or TypeError.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, TypeVar
 
 from .enums import Fault, State
 from .inhibit import Inhibit
 
 if TYPE_CHECKING:
     from .status import RobotiqStatus
+
+T = TypeVar("T", bound="RobotiqError")
 
 
 class RobotiqError(Exception):
@@ -54,11 +56,6 @@ class RobotiqError(Exception):
         if advice:
             self.advice = advice
 
-    def of_hand(self, name: str) -> Self:
-        """Name the hand; returns the error itself."""
-        self.hand = name
-        return self
-
     @property
     def message(self) -> str:
         """The text without the name of the hand and without the advice."""
@@ -72,6 +69,12 @@ class RobotiqError(Exception):
 
     def __reduce__(self) -> tuple[Callable[..., RobotiqError], tuple[object, ...], dict[str, object]]:
         return _restore, (type(self), *self.args), vars(self)
+
+
+def of_hand(error: T, name: str) -> T:
+    """Name the hand of an error; returns the error itself."""
+    error.hand = name
+    return error
 
 
 def _restore(kind: type[RobotiqError], *args: object) -> RobotiqError:

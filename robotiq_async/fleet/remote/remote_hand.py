@@ -209,9 +209,9 @@ class RemoteBackend(Backend):
         return State.DISCONNECTED if self.session is None else self.session.mirror.state
 
     @property
-    def statistics(self) -> Statistics:
+    def statistics(self) -> Statistics | None:
         """Figures of the agent's polling, at most 1 s old."""
-        return Statistics.none() if self.session is None else self.session.statistics
+        return None if self.session is None else self.session.statistics
 
     @property
     def points(self) -> tuple[tuple[int, float], ...]:

@@ -80,7 +80,7 @@ class RemoteSession:
         self.mirror: Mirror = Mirror(name.mark, channels, self.waiters.reached, mirror, Log(str(name)))
         self.dialog: Dialog = Dialog(name, bus, self.mirror, before, receive=self._receive_answer)
         self.keeper: LeaseKeeper = LeaseKeeper(self.dialog, bus)
-        self.statistics: Statistics = Statistics.none()
+        self.statistics: Statistics | None = None
         self._bus = bus
         self._channels = channels
         self._owns_bus = owns_bus
