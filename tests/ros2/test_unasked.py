@@ -24,8 +24,8 @@ async def test_the_end_waits_for_the_client_of_a_goal() -> None:
     for key in (b"one", b"another"):
         goals.accepted(key)
         goals.ended(key)
-    loop.call_later(0.5, goals.asked, b"one")
-    loop.call_later(1.0, goals.asked, b"another")
+    loop.call_later(0.5, goals.requested, b"one")
+    loop.call_later(1.0, goals.requested, b"another")
     assert await waited(goals) == pytest.approx(1.0)
 
 
@@ -33,9 +33,9 @@ async def test_nobody_waits_if_all_have_asked() -> None:
     goals = UnaskedGoals()
     assert await waited(goals) == 0.0
     goals.accepted(b"asked while it runs")
-    goals.asked(b"asked while it runs")
+    goals.requested(b"asked while it runs")
     goals.ended(b"asked while it runs")
-    goals.asked(b"a goal of another node")
+    goals.requested(b"a goal of another node")
     assert await waited(goals) == 0.0
 
 

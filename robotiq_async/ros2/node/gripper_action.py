@@ -38,17 +38,17 @@ RECEIPT_LOOK_S: Final = 0.01  # seconds between two checks of the receipt
 class _ResultServer(ActionServer):  # type: ignore[misc]  # rclpy is not here
     """Calls a function, in the executor's thread, when a client has requested the result of a goal."""
 
-    _asked: Callable[[bytes], object]
+    _requested: Callable[[bytes], object]
 
-    def when_asked(self, call: Callable[[bytes], object]) -> None:
+    def when_requested(self, call: Callable[[bytes], object]) -> None:
         """Say which function: it takes the key of the goal."""
-        self._asked = call
+        self._requested = call
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
         await super().execute(taken_data)
         if "result" in taken_data:
             _, request = taken_data["result"]
-            self._asked(bytes(request.goal_id.uuid))
+            self._requested(bytes(request.goal_id.uuid))
 
 
 class GripperAction:
@@ -83,9 +83,9 @@ class GripperAction:
             cancel_callback=self._cancel,
             callback_group=group,
         )
-        self._server.when_asked(lambda key: bridge.tell(unasked.asked, key))
+        self._server.when_requested(lambda key: bridge.tell(unasked.requested, key))
 
-    async def results_asked(self) -> None:
+    async def results_requested(self) -> None:
         """Wait, in the loop, until clients have requested the results of their goals, for seconds at most."""
         if number := self._unasked.number:
             self._log.info(f"results that no client has requested yet: {number}; the node waits for that")

@@ -94,9 +94,9 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         if self._current is not None:
             await self._disconnect(self._current[0], "the node is shutting down")
 
-    async def results_asked(self) -> None:
+    async def results_requested(self) -> None:
         """Wait, in the loop, until clients have requested the results of their goals, for seconds at most."""
-        await self._action.results_asked()
+        await self._action.results_requested()
 
     async def results_received(self) -> None:
         """Wait, in the loop, until clients have the results that were sent, for seconds at most."""

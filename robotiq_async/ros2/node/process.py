@@ -105,7 +105,7 @@ async def _end(node: GripperNode, bridge: Bridge, spinner: Spinner) -> None:
     try:
         await node.close()
         await bridge.drained(ANSWERS_S)
-        await node.results_asked()
+        await node.results_requested()
         await asyncio.sleep(LINGER_S)
         await node.results_received()
     finally:

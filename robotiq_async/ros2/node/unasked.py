@@ -22,7 +22,7 @@ class UnaskedGoals:
 
     def __init__(self) -> None:
         self._until: dict[bytes, float] = {}  # when the end of the node no longer waits for it, by its key
-        self._asked = asyncio.Event()
+        self._requested = asyncio.Event()
 
     @property
     def number(self) -> int:
@@ -37,15 +37,15 @@ class UnaskedGoals:
         if key in self._until:
             self._until[key] = now() + ASKING_S
 
-    def asked(self, key: bytes) -> None:
+    def requested(self, key: bytes) -> None:
         self._until.pop(key, None)
-        self._asked.set()
+        self._requested.set()
 
     async def wait(self) -> None:
         """Wait until a client has requested each result, or until ASKING_S after the last goal has ended."""
         at_most = now() + ASKING_S  # also for a goal that has not ended, because the executor hangs
         with suppress(TimeoutError):
             while self._until:
-                self._asked.clear()
+                self._requested.clear()
                 async with asyncio.timeout(min(at_most, max(self._until.values())) - now()):
-                    await self._asked.wait()
+                    await self._requested.wait()
