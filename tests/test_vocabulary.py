@@ -74,6 +74,15 @@ def test_asked_is_a_time() -> None:
         if each.annotation is not None and ast.unparse(each.annotation) not in ("float", "float | None")
     }
     assert others == set()
+    calls = {
+        f"{path.relative_to(PACKAGE)}: {each.name}"
+        for path in PACKAGE.rglob("*.py")
+        for each in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)
+        if each.name.strip("_").removesuffix("_at") == "asked"
+        if each.returns is None or ast.unparse(each.returns) not in ("float", "float | None")
+    }
+    assert calls == set()
 
 
 def test_the_page_of_words_is_short_and_names_places_that_exist() -> None:
