@@ -8,6 +8,7 @@ import inspect
 import itertools
 import re
 from collections.abc import Iterator
+from enum import Enum
 from pathlib import Path
 from types import FunctionType
 
@@ -54,14 +55,101 @@ EXTRAS = {
     "WrongModelError": "what a start with another model raises",
 }
 """Exports beyond it, with the reason."""
+ERROR = "advice hand message"
+SERVING = "assume drop_requests halt_inhibited resume_inhibit"
+"""Calls of a hand for programs that serve it to others: docs/reference.md has them under that title."""
+HAND = (
+    "activate address atr close command grasp grip_events halt hold inhibit inhibited "
+    "is_activated is_moving is_reset model move name open part permit recover requests reset "
+    "set_force set_position set_speed start state statistics status statuses stop transitions "
+    "units wait_for_state"
+)
+SERVER = "accept address connections cut failed failure functions is_running link port refuse start stop"
+SHOWN = {
+    "Convention": (
+        "DROID HIL_SERL LEROBOT LIBERO MANISKILL POLYMETIS_2F85 RADIANS_2F140 RADIANS_2F85 RLDS "
+        "UR_RTDE closed fraction name open value"
+    ),
+    "GraspResult": "as_dict at_least holds is_held move positions status width_mm",
+    "GripEvent": "as_dict change finger holds moved position status timestamp",
+    "Inhibit": "again as_dict from_dict halts reason since who",
+    "Model": (
+        "all_axes axes closed_reading_min fault faults forces_n has_modes has_reached mask name names "
+        "object_status open_reading_max open_reading_min rtu speeds_mm_s stroke tcp title"
+    ),
+    "MoveResult": (
+        "as_dict contacts duration from_dict object_detected opening_mm outcomes peak_current_ma "
+        "positions reached status"
+    ),
+    "Part": "holds width_mm",
+    "ReconnectPolicy": "activate first_delay give_up_after max_delay",
+    "RobotiqHand": f"{HAND} {SERVING} add_listener options",
+    "RobotiqStatus": (
+        "activation_echo as_dict as_raw axis_state contacts controller_fault controller_fault_text "
+        "current current_ma echo fault finger_status from_raw from_registers go_echo has_current "
+        "has_reached initialization is_activated is_moving is_reset mode model motion moving "
+        "open_fraction opening_mm part position registers requested_position sequence stroke "
+        "timestamp"
+    ),
+    "SentRequest": "acknowledged as_dict as_raw from_raw request timestamp",
+    "Statistics": (
+        "as_dict faults foreign_commands from_dict link_use longest_stall moves overruns "
+        "passing_faults period_p50 period_p99 polls reconnects round_trip_p50 round_trip_p99 "
+        "status_age_p50 status_age_p99 tick writes"
+    ),
+    "Stream": "aclose drain missed take_nowait",
+    "Transition": "as_dict from_dict source target timestamp trigger",
+    "Tunnel": "close exchange open",
+    "TunnelPlace": "host options port unit",
+    "Units": ("closing_s force forces label_n mm mm_per_s open_fraction position speed speeds stroke"),
+    "Bodies": "joints parts",
+    "Body": "kind position rotation size",
+    "FaultInjector": "begin check end making ongoing run",
+    "Habits": (
+        "activation_time answers_with_echo echoes_limits keeps_status_on_halt lets_go_on_halt "
+        "opens_without_rics silence_fault status_lag write_spacing"
+    ),
+    "Likeness": (
+        "begin device_cycle device_id ends exchange_s from_file from_report gripper habits link model "
+        "motion scissor_limit seed spread troubles unknown"
+    ),
+    "Physics": ("bodies control forces grip_force joint lift opening_mm part put_back take_away time"),
+    "PhysicsError": "",
+    "RtuOverTcpSimulatorServer": f"{SERVER} others power_cycle reply_silence",
+    "SerialSimulatorServer": f"{SERVER} others reply_silence",
+    "SimulatedGripper": (
+        "bodies carry_out_writes clear_faults controller_fault device_cycle emergency_release "
+        "emergency_stop end_emergency_stop fail_activation grips habits holds inject_fault interfere "
+        "is_asleep is_moving is_powered model physics place_object position power_cycle power_off "
+        "power_on remove_object request_registers speedup status_registers strand target travel write "
+        "writes"
+    ),
+    "SimulatedScale": "reading",
+    "SimulatorServer": f"{SERVER} power_cycle",
+    "Trouble": "amount at duration every is_about kind lasts on value",
+    "UrcapSimulatorServer": f"{SERVER} power_cycle",
+    "Agent": "run",
+    "Bus": "announce announced ask close publisher serve subscribe unreached watch who",
+    "Fleet": "changes halt_all hand members",
+    "GripperName": "base gripper host key mark of_key parse question site",
+    "Member": "address agents fault holder inhibited is_moving is_there model name problem seen_at state",
+    "RemoteHand": f"{HAND} acquire is_in_control release take",
+    "Route": "configuration connect endpoints insecure keys",
+}
+"""The public methods, properties and constants of each exported class; enumerations and errors aside."""
+
+
+def shown(kind: type) -> set[str]:
+    """The public names in a class and its bases, without its fields that are set when one is made."""
+    ours = [base for base in kind.__mro__ if base.__module__.startswith("robotiq_async")]
+    return {name for base in ours for name in vars(base) if not name.startswith("_")}
 
 
 def methods() -> Iterator[tuple[str, object]]:
     """The public methods and properties, by their full names; those that dataclasses and enums make aside."""
     for module in (robotiq_async, simulator, fleet, sync):
         for kind in (each for name in module.__all__ if isinstance(each := getattr(module, name), type)):
-            ours = [base for base in kind.__mro__ if base.__module__.startswith("robotiq_async")]
-            for name in {name for base in ours for name in vars(base) if not name.startswith("_")}:
+            for name in shown(kind):
                 member = inspect.getattr_static(kind, name)
                 function = (
                     member.fget if isinstance(member, property) else getattr(member, "__func__", member)
@@ -108,6 +196,30 @@ def test_every_public_method_and_attribute_is_described() -> None:
         for field in dataclasses.fields(value) if dataclasses.is_dataclass(value) else ():
             if not field.name.startswith("_"):
                 assert f"{field.name}:" in value.__doc__, f"{name}.{field.name} is not in its docstring"
+
+
+def test_a_class_shows_what_users_may_call_and_nothing_else() -> None:
+    """A helper of the library is private, a function, or stands on a class that is not exported.
+
+    The blocking hand and its stream have the names of the others: tests/sync/test_signatures.py.
+    """
+    for module in (robotiq_async, simulator, fleet):
+        for name in module.__all__:
+            kind = getattr(module, name)
+            if isinstance(kind, type) and not issubclass(kind, Enum):
+                names = ERROR if issubclass(kind, robotiq_async.RobotiqError) else SHOWN[name]
+                assert shown(kind) == set(names.split()), name
+
+
+def test_the_calls_for_programs_that_serve_a_hand_are_told_as_theirs() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "reference.md").read_text(encoding="utf-8")
+    _, _, section = page.partition("\n## A hand that you serve to others\n")
+    told = set(re.findall(r"^- `(\w+)\(", section.partition("\n## ")[0], re.MULTILINE))
+    hand = robotiq_async.RobotiqHand
+    serve = {
+        name for name in shown(hand) if "serves the hand to others" in (getattr(hand, name).__doc__ or "")
+    }
+    assert told == serve == set(SERVING.split())
 
 
 def test_every_error_that_a_docstring_names_is_exported() -> None:

@@ -167,14 +167,6 @@ class RobotiqHand(Hand):
         """The options of the hand, checked."""
         return self._local.options
 
-    def assume(self, settings: Mapping[tuple[Finger, str], int]) -> None:
-        """Say which speeds and forces the gripper has at the next start: the status does not echo them.
-
-        Args:
-            settings: counts by axis, and "speed" or "force". The options give the values that are left out.
-        """
-        self._local.assume(settings)
-
     def add_listener(
         self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]
     ) -> Callable[[], None]:
@@ -203,8 +195,22 @@ class RobotiqHand(Hand):
         self._local.check_may_listen()
         return self._local.channels.listeners.add(callback)
 
+    # -- for programs that serve a hand to others ----------------------------------------------------------
+
+    def assume(self, settings: Mapping[tuple[Finger, str], int]) -> None:
+        """Say which speeds and forces the gripper has at the next start: the status does not echo them.
+
+        For a program that serves the hand to others, as an agent does.
+
+        Args:
+            settings: counts by axis, and "speed" or "force". The options give the values that are left out.
+        """
+        self._local.assume(settings)
+
     def drop_requests(self, why: str) -> None:
         """Drop the requests that were not sent, except holds and halts: for a client that has lost control.
+
+        For a program that serves the hand to others, as an agent does.
 
         A speed or a force that is not written yet would take effect under the next client. Calls that wait
         for dropped requests raise MoveSupersededError. A motion that was sent continues: :meth:`hold` ends
@@ -218,6 +224,8 @@ class RobotiqHand(Hand):
     def resume_inhibit(self, inhibit: Inhibit) -> None:
         """Inhibit motion as :meth:`inhibit` does, but send nothing: for an inhibit of an earlier process.
 
+        For a program that serves the hand to others, as an agent does.
+
         Args:
             inhibit: its reason, author and time. An earlier inhibit stays, and counts one more halt.
         """
@@ -225,6 +233,8 @@ class RobotiqHand(Hand):
 
     async def halt_inhibited(self) -> None:
         """Halt as :meth:`inhibit` does, after :meth:`resume_inhibit` of a hand that runs.
+
+        For a program that serves the hand to others, as an agent does.
 
         Raises:
             RobotiqError: as :meth:`inhibit`; the fingers MAY STILL MOVE.
