@@ -153,6 +153,8 @@ def make_keys(folder: Path) -> None:
 
 async def flood(kind: str, seconds: float) -> dict[str, Any]:
     has_keys = KINDS[kind][0]
+    turn = BLOCK_S * len(GOALS)
+    seconds = turn * max(1, round(seconds / turn))  # so that each goal has as many blocks
     endpoint, other = [f"{'tls' if has_keys else 'tcp'}/127.0.0.1:{free_port()}" for _ in range(2)]
     running: list[Process] = []
     with tempfile.TemporaryDirectory() as folder:
