@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection
 from typing import Final, Literal, TypeVar
 
 from ..calibration import ForceCalibration, SpeedCalibration, Units
-from ..runtime.concurrency import check_loop
+from ..runtime.concurrency import check_loop, wait_shielded
 from ..runtime.logger import Log
 from ..values.checks import check_flag
 from ..values.enums import Finger, State, StopLevel, Trigger
@@ -167,6 +167,11 @@ class Backend(ABC):
     def is_started(self) -> bool:
         """Whether a run has begun, and neither ended nor begun to end."""
         return self.session is not None and not self.session.is_over
+
+    async def wait_for_end(self, ending: asyncio.Future[None]) -> None:
+        """Wait until a run has ended, also when cancelled; then raise its error or the cancellation."""
+        await wait_shielded(ending)
+        ending.result()
 
     def keeps_grip(self, keep_grip: bool | None) -> bool:
         """The argument of a stop, checked; None is the default of the hand."""

@@ -10,8 +10,7 @@ import robotiq_async.fleet
 
 ROOM = Path(robotiq_async.fleet.__file__).parent
 MOST_LINES = 5900
-MOST_NAMES = 41
-"""Two of them are the Hand that a remote hand is, and the Backend that it has."""
+MOST_NAMES = 40
 CORE = {
     *("calibration", "control", "hands", "link", "local", "runtime", "simulator", "sync", "values"),
 }

@@ -15,7 +15,7 @@ from ...values import Finger, NotStartedError, RobotiqError, StopLevel, check_se
 from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..errors import AgentError, ControlLostError, NotAllowedError
 from ..network.bus import Bus, Urgency
-from ..wire.envelope import AgentAnswer, AgentCall
+from ..wire.envelope import AgentAnswer, AgentCall, outcome
 from ..wire.names import GripperName
 from ..wire.settings import moved_by
 from ..wire.values import Fields
@@ -294,9 +294,8 @@ class Dialog:
         # request, such as that nothing was done, may not hold for this one.
         for errand in self._commands.values():
             if errand.call.lease == self.lease.number:
-                outcome = f"{errand.verb} may have been carried out"
-                error = ControlLostError(f"{self.name}: the lease has ended ({reason}); {outcome}", reason)
-                errand.end_soon(LAST_ANSWER_S, error)
+                why = f"{self.name}: the lease has ended ({reason}){outcome(None, errand.verb)}"
+                errand.end_soon(LAST_ANSWER_S, ControlLostError(why, reason))
 
     # -- the end ---------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from ...runtime import Limit, now
 from ...values import ConnectionLostError, RobotiqError
 from ..errors import AgentError
 from ..network.bus import BusReply, Urgency
-from ..wire.envelope import AgentAnswer, AgentCall, unpack_answer
+from ..wire.envelope import AgentAnswer, AgentCall, outcome, unpack_answer
 from ..wire.settings import Setting, asked_of
 
 ERRAND_REPEAT_S: Final = (
@@ -44,7 +44,7 @@ class NoAnswerError(ConnectionLostError):
 
     def __init__(self, name: object, verb: str, why: str = "no answer") -> None:
         self.why = why
-        super().__init__(f"{name}: {why}; {verb} may have been carried out")
+        super().__init__(f"{name}: {why}{outcome(None, verb)}")
 
 
 @contextmanager
@@ -256,9 +256,7 @@ class Errand:
         if not isinstance(said, AgentAnswer):
             return said
         if said.to != self.call.to or said.number not in (0, self.call.number):
-            return AgentError(
-                f"{self._name}: another answer came to {self.verb}; it may have been carried out"
-            )
+            return AgentError(f"{self._name}: another answer came{outcome(None, self.verb)}")
         if self.call.epoch not in (0, said.epoch) and self.verb not in IN_ANY_RUN:
             # That run did nothing. Whether the addressed run carried it out is unknown.
             return NoAnswerError(self._name, self.verb, "another run of its agent answered")

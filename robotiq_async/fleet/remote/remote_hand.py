@@ -82,7 +82,7 @@ class RemoteBackend(Backend):
         if session is not None and not session.dialog.has_ended:
             self.check_called_in_loop()
             session.dialog.clear("stopped")
-            await session.close(self.stop_level(halt, keep_grip))
+            await self.wait_for_end(session.close(self.stop_level(halt, keep_grip)))
 
     async def _open_bus(self) -> Bus:
         if self._shared_bus is not None:

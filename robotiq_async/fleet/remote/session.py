@@ -28,7 +28,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from ...hands import Channels, StateWaiters, Statistics
-from ...runtime import Limit, Log, now, wait_shielded
+from ...runtime import Limit, Log, now
 from ...values import (
     ConnectFailedError,
     ConnectionLostError,
@@ -145,8 +145,8 @@ class RemoteSession:
         why = "no agent was found: none is running, or the network or a certificate prevents the connection"
         raise ConnectFailedError(str(name), why)
 
-    async def close(self, level: StopLevel) -> None:
-        """End the run within 2 s, also if the caller is cancelled; every caller waits for the end.
+    def close(self, level: StopLevel) -> asyncio.Task[None]:
+        """End the run within 2 s; all calls return the same task, which ends with the run.
 
         From this call on only requests that end motion are sent. Of several calls the strongest level
         applies. A hold or a halt that is not acknowledged yet makes a gentle level stronger.
@@ -157,8 +157,7 @@ class RemoteSession:
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
             self._closing = self.dialog.loop.create_task(self._close())
         self.keeper.end(level)
-        await wait_shielded(self._closing)
-        self._closing.result()
+        return self._closing
 
     async def _close(self) -> None:
         try:

@@ -128,14 +128,17 @@ def unpack_answer(data: bytes) -> AgentAnswer:
         raise ProtocolError(f"not an answer: {data[:200]!r}") from error
 
 
-_WORDS: Final = {False: "; nothing was done", None: "; it may have been carried out", True: "; it had begun"}
+def outcome(begun: bool | None, what: str = "it") -> str:
+    """The only words that say whether a request was carried out; None: not known."""
+    words = {False: "nothing was done", None: f"{what} may have been carried out", True: f"{what} had begun"}
+    return f"; {words[begun]}"
 
 
 def failure(call: AgentCall, epoch: int, error: Exception, begun: bool | None) -> AgentAnswer:
     """The answer with an error, and with the only statement whether the request was carried out."""
     fields = error_fields(error)
     if isinstance(error, AgentError | ControlLostError):
-        fields["message"] += _WORDS[begun]
+        fields["message"] += outcome(begun)
     return AgentAnswer(call.to, call.number, epoch, error=fields, begun=begun)
 
 
