@@ -230,7 +230,7 @@ class Controller:
 
     @property
     def is_moving(self) -> bool:
-        """Whether an axis moves, or will because of a write that does not act yet."""
+        """Whether an axis moves, or will move by a change that is not written, or does not act yet."""
         if self.status is None:
             return False
         if self.status.is_moving or self.is_driven:
@@ -296,7 +296,7 @@ class Controller:
     # -- statuses --------------------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status that was read after every acknowledgement so far; requested at ``asked``."""
+        """Take in a status that was read after every acknowledgement so far, and requested at ``asked``."""
         ledger, duty, before = self.ledger, self._duty, self.evidence.condition
         self.status = status
         condition = self.evidence.update(status, asked)

@@ -58,8 +58,9 @@ class Entry:
 class Begun(NamedTuple):
     """An activation or a release that our write has begun, or may have begun: stopping the hand ends it.
 
-    A write begins an activation that nobody requested if another client resets the gripper just before it:
-    then its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
+    Another client may reset the gripper just before one of our writes. Then the rACT of this write rises, and
+    begins an activation that nobody requested [follows]. An emergency stop shows the same [seen], and moves
+    nothing.
     """
 
     entry: Entry

@@ -1,10 +1,11 @@
 """The images that are written, and the gate through which they leave: it alone decides about rACT and rATR.
 
 A rising rACT moves all fingers to their stops, and rATR releases the part [manual 2012, 4.6]. An image is
-made from an older one, so either could be carried along by accident: by a command after another client's
-reset, by a stop that crosses a power cycle, by a hold after a release. So an image has rACT only if the
-gripper shows it and none of our images may clear it first, and rATR never; an activation may raise rACT, and
-a release rATR.
+made from an older one, so it could carry rACT or rATR along by accident: a command after another client's
+reset, a stop that crosses a power cycle, a hold after a release.
+
+So an image has rACT only if the gripper shows rACT and none of our images may clear it first. An image never
+has rATR. There are two exceptions: an activation may raise rACT, and a release may raise rATR.
 """
 
 from __future__ import annotations

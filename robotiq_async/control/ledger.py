@@ -170,7 +170,7 @@ class Ledger:
         return self.contacts.pressing(status, self.base) & ~self.contacts.open
 
     def may_press(self, status: RobotiqStatus, since: float) -> Finger:
-        """The axes that show a motion where they were in contact: not known yet whether they press again."""
+        """The axes that were in contact and show a motion. Whether they press again is not known yet."""
         # An axis that moves has soon moved off. One that still shows a motion after that presses. The motion
         # may be due to a force of another client, which no echo shows: so ``since`` counts, when a hold was
         # first due, and not our last write alone.
@@ -178,7 +178,10 @@ class Ledger:
         return self._pressing_again(status) if is_recent else NO_AXES
 
     def held(self, axes: Finger, status: RobotiqStatus, age: float = 0.0) -> dict[Finger, int]:
-        """The axes of these that a hold must stop, and where it finds each; ``age`` is that of the status."""
+        """The position of each of ``axes`` that a hold must stop, at the time at which the hold acts.
+
+        ``age`` is the age of the status in seconds.
+        """
         if not axes or not (base := self.base).go:
             return {}  # rGTO = 0 stops every axis [manual 2014, p. 50]
         may_move = self.requests.may_move(status, self.now)
@@ -367,9 +370,12 @@ class Ledger:
         self.contacts.ask(Finger.ALL)
 
     def restart(self, status: RobotiqStatus) -> bool:
-        """A procedure has ended: the gripper has its last image, and no other write is on its way."""
-        # Return whether the status shows that image; if not, another client has written since. rATR has no
-        # echo [manual 2014, p. 50]: while a gripper follows requests, an image with rATR counts as not shown.
+        """Begin again after a procedure: the gripper has its last image, and no other write is on its way.
+
+        Returns whether the status shows that image; if not, another client has written since.
+        """
+        # rATR has no echo [manual 2014, p. 50]: while a gripper follows requests, an image with rATR counts
+        # as not shown.
         image, time = self.base, (self.ahead or self._past)[-1].time
         self.match = Entry(image, status.echo, True, time, time)
         self._past, self.ahead = deque([self.match]), ()

@@ -184,7 +184,7 @@ class OpenRequests:
             resolve(self._close([call for call in self.calls if call.entry is not None and not call.halts]))
 
     def answer_halts(self, ledger: Ledger, status: RobotiqStatus, *, is_over: bool) -> None:
-        """Answer the callers of halts that are over, and in any case callers that have waited too long."""
+        """Answer all callers of halts once the halt is over; until then, those that have waited too long."""
         # A halt may be replaced by newer halts again and again: its callers do not wait for ever.
         since = ledger.now.time - MOST_HALTS * WINDOW_S
         halts = [each for each in self.calls if each.halts]

@@ -334,9 +334,9 @@ class Course:
             self._kept.append((asked, status))
 
     def after(self, axis: Finger, request: int, status: RobotiqStatus, asked: float, seconds: float) -> int:
-        """Its position so long after a status, on its way to a request; as it shows if it may stand.
+        """The position of an axis some seconds after a status, on its way to a request.
 
-        The status was requested at ``asked``.
+        If the axis may stand, that is the position in the status, which was requested at ``asked``.
         """
         at, since, first = status.position(axis), asked, status
         # A fault stops the axes, and gDT shows a motion.

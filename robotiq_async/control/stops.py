@@ -45,7 +45,7 @@ not show yet."""
 
 
 class Ended(NamedTuple):
-    """A duty is over, and has nothing to write; ``why`` it has failed, if it has."""
+    """The end of a duty: it has nothing more to write. ``why`` says how it failed; empty if it did not."""
 
     why: str = ""
 

@@ -61,7 +61,7 @@ class Move(Call):
         )
 
     def see(self, status: RobotiqStatus, unrested: Finger, limited: Mapping[Finger, int]) -> bool:
-        """Take in a status; whether it shows the move ended, unless its axes are ``unrested``."""
+        """Take in a status; return whether it ends the move. An ``unrested`` axis may still move."""
         for axis, peak in self._peak.items():
             self._peak[axis] = max(peak, status.current_ma(axis) or 0)
         # An axis may be known to rest by its position, and move by its gDT, which is then from before.

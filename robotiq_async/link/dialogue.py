@@ -135,11 +135,13 @@ class Dialogues:
     def write_and_read(self, decide: Decide) -> Dialogue[transport.WriteAnswer | None]:
         """Write the image that ``decide`` returns, and read the status; None if nothing new was written.
 
-        After a reply that is missing or damaged the write is in doubt, and the status that is read tells. A
-        device that refuses function 23, or does not answer it at first, gets function 16 from then on. Only a
-        refused request, which was not carried out, is written with it at once: ``decide`` is called again for
-        that, because a stop may have come since. After a trial of the function ``decide`` is not called: the
-        status on which it would decide is too old.
+        A missing or damaged reply leaves the write in doubt; the status that is read shows whether it was
+        carried out.
+
+        A device that refuses function 23, or does not answer it at first, gets function 16 from then on. A
+        refusal of the function means that nothing was carried out. So the dialogue calls ``decide`` again,
+        because a stop may have come since, and writes with function 16 at once. A trial of function 23 calls
+        no ``decide``: the status on which it would decide is too old.
         """
         yield from self._ready()
         uses_23 = self._map.is_sure if self.serves_23 is None else self.serves_23
@@ -165,9 +167,9 @@ class Dialogues:
         return transport.WriteAnswer(status, came_to.error)
 
     def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
-        """Write the image that ``decide`` returns when the turn has come; read the status if there is none.
+        """When the turn has come, call ``decide`` and write its image; without an image, read the status.
 
-        After a disturbance it reads, which brings the line in step before a write.
+        After a disturbance it reads: a read brings the line in step, so that the next write can leave.
         """
         if not isinstance((yield READY), Outcome) and (yield from self._written_whole(decide)):
             return None

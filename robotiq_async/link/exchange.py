@@ -1,8 +1,8 @@
-"""One request and the bytes of its reply so far: bytes in, an answer or an outcome out. Other steps.
+"""One request and the bytes of its reply so far: bytes in, an answer or an outcome out. Also other steps.
 
-No I/O, no clock and no event loop. A line sends :attr:`Exchange.frame` and feeds the bytes that arrive; the
-first thing that comes out is the last. An answer is its body from the function code on; of other protocols,
-its text.
+No I/O, no clock and no event loop. A line sends :attr:`Exchange.frame` and feeds the bytes that arrive. The
+exchange is over with the first answer or outcome that comes out. A Modbus answer is the body of the reply,
+from the function code on; an answer of another protocol is its text.
 
 A line that echoes each request (a half-duplex adapter that receives its own bytes) is recognised by the first
 read of a connection. It needs no option: a reply to a read does not begin with the whole request, checksum
@@ -30,9 +30,9 @@ class Timing(NamedTuple):
 
     Attributes:
         seconds: the longest time from the request to the end of the reply.
-        by: when it must be over even so, in the loop's time.
-        is_long: whether the longer silence is kept before it.
-        is_whole: whether it may take that longest time where others use the line, too.
+        by: its latest end, in the loop's time, even if ``seconds`` are not over.
+        is_long: whether the longer silence of a serial line comes before the request.
+        is_whole: whether it may take all of ``seconds`` on a shared line, too.
     """
 
     seconds: float
@@ -98,17 +98,17 @@ class PduExchange(Exchange):
 class Step(Enum):
     """A step of a dialogue other than an exchange."""
 
-    READY = "everything that a request waits for; comes to the obstacle to one, if there is any"
-    HUSH = "silence; comes to noise if there is none"
-    TURN = "that others have their turn"
+    READY = "everything that a request waits for; its result is the obstacle to a request, if there is any"
+    HUSH = "silence; its result is noise if there is none"
+    TURN = "a turn for the others"
 
 
 READY, HUSH, TURN = Step
 DONE: Final = b""
-"""A wish that was fulfilled comes to this."""
+"""The result of a step that has succeeded, if it is no exchange."""
 
 Dialogue = Generator[Exchange | Step, Answer, T]
-"""Yields steps and gets what each comes to: an answer, or the outcome that prevents it."""
+"""Yields steps and gets the result of each: an answer, or the outcome that prevents it."""
 
 
 class EchoFilter:

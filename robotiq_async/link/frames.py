@@ -97,10 +97,10 @@ class Expected(NamedTuple):
 
     Attributes:
         start: the first bytes of the good reply: header, function code and the bytes that must follow it.
-        size: bytes of the good reply.
+        size: number of bytes of the good reply.
         refusal: the first bytes of an exception reply: header and function code.
-        refusal_size: bytes of an exception reply.
-        checksum: bytes of the checksum, at the end of both; 0 if there is none.
+        refusal_size: number of bytes of an exception reply.
+        checksum: number of bytes of the checksum, at the end of both replies; 0 if there is none.
     """
 
     start: bytes

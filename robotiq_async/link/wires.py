@@ -9,7 +9,7 @@ Serial ports are read and written by descriptor. pyserial's read() waits with se
 descriptors of 1024 and above, and its write() tries again in a busy loop while the port takes no more. Ports
 without a descriptor, as on Windows, are left to pymodbus.
 
-Exceptions of others become a ConnectFailedError by a table for each call.
+Exceptions of the system and of packages become a ConnectFailedError; each call has a table of reasons.
 """
 
 from __future__ import annotations
@@ -65,12 +65,13 @@ class Wire(Protocol):
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
         """Connect; return a function that sends a frame.
 
-        That never blocks, and raises OSError when the wire has ended. Who opens a wire also closes it, when
-        this has failed, too.
+        The function never blocks, and raises OSError when the wire has ended. The caller closes the wire,
+        also if this call has failed.
 
         Args:
             on_data: gets all bytes, from the first one on.
-            on_end: gets the reason when the wire has ended by itself, or a request on it without an answer.
+            on_end: gets the reason when the wire has ended by itself, or when a request on it has ended
+                without an answer.
             seconds: for how long the caller waits; it cancels the call then.
 
         Raises:

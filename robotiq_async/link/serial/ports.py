@@ -44,7 +44,7 @@ def why_no_port(error: OSError | None, folder: Path = BY_ID) -> str:
 
 
 def names_of_adapters(folder: Path = BY_ID) -> dict[str, str]:
-    """The USB adapters that are plugged in: by device, the path that names the adapter (Linux)."""
+    """For the device of each plugged-in USB adapter, the path that names the adapter (Linux)."""
     with contextlib.suppress(OSError):
         return {os.path.realpath(path): str(path) for path in sorted(folder.iterdir())}
     return {}
