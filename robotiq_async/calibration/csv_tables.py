@@ -32,12 +32,12 @@ CsvRow = tuple[int, list[str]]  # line number and cells
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The columns of a table.
+    """The columns of a table: a value, and the measurements at this value, one of each run.
 
     Attributes:
         value: name of the first column; its values are 0..255.
-        unit: unit of the runs.
-        high: highest run allowed; the lowest is 0.
+        unit: unit of the measurements.
+        high: highest measurement allowed; the lowest is 0.
     """
 
     value: str

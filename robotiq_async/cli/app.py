@@ -68,7 +68,7 @@ def build(arguments: Sequence[str] = ()) -> App:
     """The command line. Each sub-command imports its slow dependencies itself.
 
     Args:
-        arguments: If the first is a sub-command, only that one is added: all of them take 7 ms.
+        arguments: If the first is a sub-command, only that one is added, because all of them take 7 ms.
     """
     app = _app("robotiq-async", _HELP)
     ways: dict[str, Callable[[], object]] = {each.__name__: partial(_add, app, each) for each in SUBCOMMANDS}

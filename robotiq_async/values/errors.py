@@ -152,7 +152,7 @@ class MotionInhibitedError(RobotiqStateError):
 
     Attributes:
         reason: the reason that was given.
-        who: the person or program that set it; may be empty.
+        who: the person or program that set the inhibit; may be empty.
         since: seconds since 1970.
     """
 

@@ -133,7 +133,7 @@ class ServedHand:
     # -- requests --------------------------------------------------------------------------------------
 
     def may_be_of_holder(self, payload: bytes) -> bool:
-        """Whether a request may be of the client that commands, if one does. In any thread."""
+        """Whether a request may come from the lease's holder; True without one. Thread-safe."""
         holder = self._lease.holder
         return holder is None or holder.client.encode() in payload
 

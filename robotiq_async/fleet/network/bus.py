@@ -136,7 +136,7 @@ class Bus(Protocol):
         """The matching keys that are announced now; ``timeout`` is in seconds."""
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
-        """Call a listener with each matching key and True when it is announced, False when it is gone.
+        """Call ``listener(key, True)`` when a matching key is announced, with False when it is gone.
 
         Keys announced before this call are included. Returns the function that ends it.
         """

@@ -165,8 +165,8 @@ class Mirror:
     ) -> bool:
         """Take over a message; returns whether it is current, that is, at most ``window`` seconds old.
 
-        With ``in_turn`` it was published, and has its place among the other statuses. The status of an answer
-        may have overtaken some of these: readers get those first. ``asked`` is our time of its question.
+        With ``in_turn`` it was published, and readers get its status. An answer may overtake published
+        statuses, so readers do not get its status. ``asked`` is our time of the question that it answers.
         """
         if message.epoch != self.epoch:
             self._begin_run(message, arrival)

@@ -36,7 +36,7 @@ SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
 
 
 class RemoteBackend(Backend):
-    """Has the agent carry out the calls; ``control`` says when it acquires the lease."""
+    """The agent carries out its calls; ``control`` says when to acquire the lease."""
 
     session: RemoteSession | None = None
 

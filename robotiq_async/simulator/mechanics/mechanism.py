@@ -99,7 +99,10 @@ class BodyMechanism:
         return drive if self._stepper is None else OrderedDrive(drive, self._stepper.orders)
 
     def step(self, until: float) -> bool:
-        """Make one step, or see whether the thread has."""
+        """Make one step if it is due; return whether it was made.
+
+        A thread makes its steps by itself: then return whether it has made any since the last call.
+        """
         world = self.world
         if self._stepper is not None:
             if not self._was_stopped:

@@ -87,7 +87,7 @@ class StatusTrail:
                 return
 
     def at(self, time: float) -> Statuses:
-        """The value at a time; for a time that is dropped, the oldest value kept."""
+        """The statuses at a time; before the oldest entry that is kept, the statuses of that entry."""
         for entry in reversed(self._entries):
             if entry.since <= time:
                 return entry.statuses

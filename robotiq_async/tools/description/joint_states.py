@@ -80,6 +80,6 @@ def align(body: bytearray, size: int) -> None:
 
 
 def add_string(body: bytearray, text: str) -> None:
-    """Append a string whose length is aligned."""
+    """Append a string: its length, its bytes and a zero. Align the body to 4 bytes first."""
     encoded = text.encode() + b"\0"
     body += pack("<I", len(encoded)) + encoded
