@@ -127,7 +127,7 @@ class UrcapTransport:
     """A jaw behind the text port of Robotiq's URCap.
 
     Attributes:
-        has_current: whether the port knows the motor current, as the last opening has found.
+        has_current: whether the port knows the motor current, as the openings have found.
     """
 
     def __init__(
@@ -232,7 +232,8 @@ class UrcapTransport:
 
     def _opening(self) -> Dialogue[bool]:
         """Make the first exchanges; return whether the gripper can be read."""
-        if (yield from self._read("FLT" if self._unanswered == "STA" else "STA")) is None:
+        last_unanswered = self._unanswered
+        if (yield from self._read("FLT" if last_unanswered == "STA" else "STA")) is None:
             return False
         if self._gripper is not None:
             outcome = yield UrcapSetting(lines.choice(self._gripper), self._timing)
@@ -244,7 +245,10 @@ class UrcapTransport:
         outcome = yield question
         if isinstance(outcome, Noise | Silent):
             yield Step.HUSH
-        self.has_current = isinstance(outcome, bytes) and question.values != [lines.UNREADABLE]
+            # One answer may be lost. A port that knew the current still does, unless a status ended on it.
+            self.has_current = self.has_current and last_unanswered != CURRENT
+        else:
+            self.has_current = isinstance(outcome, bytes) and question.values != [lines.UNREADABLE]
         return True
 
     def _reading(self) -> Dialogue[Registers | None]:
