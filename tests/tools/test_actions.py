@@ -137,12 +137,15 @@ async def test_a_gripper_that_is_gone_was_not_stopped(active: Operator, server: 
     assert MOVING in await active.leave()
 
 
-async def test_a_release_is_not_stopped_by_leaving(active: Operator, gripper: SimulatedGripper) -> None:
+async def test_leaving_stops_a_release_that_was_begun_here(
+    active: Operator, gripper: SimulatedGripper
+) -> None:
     await active.move(200, Finger.ABC)
     await fail(active, gripper)
     releasing = asyncio.create_task(active.act(ACTIONS["release"]))
     await active.hand.wait_for_state(State.WF_ATR)
-    assert MOVING in await active.leave()
+    assert STOPPED in await active.leave()
+    assert not gripper.request_registers[0] & 0x0100, "reset, which ends it"
     with pytest.raises(NotStartedError):
         await releasing
 

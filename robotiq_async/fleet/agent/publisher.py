@@ -118,7 +118,7 @@ class HandPublisher:
             "is_moving": self._is_moving(),
             "holder": None if holder is None else holder.label,
             "problem": self.problem,
-            "statistics": self._statistics,
+            "statistics": self._statistics if self._statistics["polls"] else self._hand.statistics.as_dict(),
         }
 
     def _head(self) -> dict[str, Any]:
