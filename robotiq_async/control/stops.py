@@ -195,7 +195,7 @@ class Keeping(Stop):
         return None if held == base else held
 
     def _doubt(self, ledger: Ledger, status: RobotiqStatus) -> str:
-        """Why no grip can be kept; empty as long as one may."""
+        """The reason that no grip can be kept; empty as long as a grip may be kept."""
         condition = classify(status)
         # Any fault, also a minor one: no hand would be there to see it clear.
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:

@@ -25,10 +25,7 @@ from typing import Final, Literal
 from ..control.pending import changes
 from ..control.state_machine import StateMachine
 from ..hands.backend import Backend
-from ..hands.options import (
-    HandOptions,
-    NoAddress,
-)
+from ..hands.options import HandOptions, NoAddress
 from ..hands.statistics import Statistics
 from ..hands.waiting import STALLED_S, StallWatch
 from ..runtime.clock import now

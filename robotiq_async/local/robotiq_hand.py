@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
 
 from ..calibration import ForceCalibration, SpeedCalibration
 from ..hands.base import Hand
@@ -26,13 +25,6 @@ from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.status import RobotiqStatus
 from .backend import LocalBackend
-
-RESET_TIMEOUT_S: Final = 5.0  # a reset takes a device cycle or two; this leaves room for a slow one
-# A release opens slowly; no figure is published. A full stroke at the slowest speed takes 10 s.
-RELEASE_TIMEOUT_S: Final = 60.0
-# Interference counts as minor for 20 s, a release may take a minute, a reset and an activation follow.
-RECOVER_TIMEOUT_S: Final = 90.0
-RESETS: Final = 2  # after an emergency stop one reset has been seen to help, and sometimes a second
 
 
 class RobotiqHand(Hand):

@@ -59,7 +59,7 @@ KINDS: Final[dict[str, tuple[bool, int, Callable[[int], str], dict[str, Any]]]] 
 
 
 def goal(at: float, begun: float) -> str:
-    """Where the flood goes."""
+    """The agent that is flooded at a time."""
     return GOALS[int((at - begun) / BLOCK_S) % len(GOALS)]
 
 

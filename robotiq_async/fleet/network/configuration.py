@@ -21,8 +21,8 @@ UNKNOWN_MS: Final = 5000  # time in ms after which such connections are closed; 
 LINK_LEASE_MS: Final = 1000
 """Time in ms after which a frozen or unplugged peer is detected; zenoh's default is 10 s."""
 QUESTIONS_HZ: Final = 200.0
-"""Questions a second about one gripper that zenoh lets in from one connection: nobody asks again within
-5 ms who waits for the answers."""
+"""Questions a second about one gripper that zenoh lets in from one connection: a client that waits for its
+answers does not ask again within 5 ms."""
 
 
 def agent_configuration(
